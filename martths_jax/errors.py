@@ -1,0 +1,29 @@
+"""The one exception for anything a user can get wrong, and how its sentences are built."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class InputError(ValueError):
+    """An argument, file or configuration that cannot be used.
+
+    The message is one sentence per problem: where it is, what was given, what is wanted and,
+    if there is one, the remedy.  The command line prints it without a traceback and exits with 2.
+    """
+
+
+def argument_error(name: str, wanted: str, got: object, remedy: str = "") -> InputError:
+    """``InputError`` of the form "Argument `name` must <wanted>, but got <got>.  <remedy>"."""
+    sentence = f"Argument `{name}` must {wanted}, but got {got}."
+    return InputError(f"{sentence} {remedy}" if remedy else sentence)
+
+
+def raise_all(problems: Iterable[str], heading: str = "The configuration cannot be used") -> None:
+    """Raise one ``InputError`` that lists every problem; do nothing when there is none."""
+    problems = list(problems)
+    if len(problems) == 1:
+        raise InputError(problems[0])
+    if problems:
+        lines = "\n".join(f"  {i}. {text}" for i, text in enumerate(problems, 1))
+        raise InputError(f"{heading} ({len(problems)} problems):\n{lines}")
