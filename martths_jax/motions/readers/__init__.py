@@ -1,0 +1,81 @@
+"""Readers of ground-motion files, one format a module, behind one function."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from ...errors import InputError
+from ..checks import file_bytes, finite_values
+from ..record import Record
+from ..units import TO_SI, parse_unit
+from .contents import Contents
+from .matlab import read_matlab
+
+#: File name endings that are taken for a ground motion, and who reads them.
+READERS = {".mat": read_matlab}
+
+
+def read_record(
+    path: Path,
+    *,
+    name: str = "",
+    units: str | None = None,
+    dt: float | None = None,
+    variable: str | None = None,
+) -> Record:
+    """The unscaled `Record` in a file; every failing is an `InputError`.
+
+    Args:
+        path: the file; its ending picks the reader.
+        name: name of the record (default: the file name without its ending).
+        units: unit of the numbers, where the file does not say it.
+        dt: time step [s], where the file has no time.
+        variable: array of a MATLAB file (``field`` of a struct: ``struct.field``).
+    """
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        known = ", ".join(READERS)
+        raise InputError(
+            f"File {path} ends in {path.suffix or 'nothing'!r}, but a ground motion must be one "
+            f"of {known}; rename or convert it."
+        )
+    content = file_bytes(path)
+    found: Contents = reader(path, content, variable=variable, dt=dt)
+    unit = _unit_of(found, units)
+    values = finite_values(found.values, found.where, found.lines)
+    step = found.dt if found.dt is not None else dt
+    if step is None:
+        raise InputError(
+            f"{found.where} has no time column and no time step; give the time step (--dt 0.005)."
+        )
+    if found.dt is not None and dt is not None and abs(found.dt / dt - 1) > 1e-3:
+        raise InputError(
+            f"{found.where} has the time step {found.dt:.6g} s, but --dt says {dt:.6g} s; "
+            "leave --dt out."
+        )
+    return Record(
+        name=name or path.stem,
+        acceleration=values * TO_SI[unit],
+        dt=float(step),
+        source=str(path),
+        sha256=hashlib.sha256(content).hexdigest(),
+        notices=found.notices,
+    )
+
+
+def _unit_of(found: Contents, asked: str | None) -> str:
+    wanted = parse_unit(asked, "Argument `units` (--units)") if asked else None
+    if found.unit is None:
+        if wanted is None:
+            raise InputError(
+                f"{found.where} does not say the unit of its acceleration, which could be "
+                f"{', '.join(TO_SI)}; give it (--units m/s2)."
+            )
+        return wanted
+    if wanted is not None and wanted != found.unit:
+        raise InputError(
+            f"{found.where} says that its unit is {found.unit}, but --units says {wanted}; leave "
+            "--units out, or correct the file."
+        )
+    return found.unit

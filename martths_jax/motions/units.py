@@ -1,0 +1,75 @@
+"""Units of acceleration, and quantities written with one (``0.4g``, ``0.3g@2.29Hz``)."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from ..errors import InputError, argument_error
+
+#: Standard gravity [m/s^2].
+G = 9.80665
+
+#: Factor from each unit to m/s^2, by the name ``--units`` takes.
+TO_SI = {"g": G, "m/s2": 1.0, "cm/s2": 0.01}
+
+_SPELLINGS = {
+    "g": "g", "gs": "g", "gravity": "g",
+    "m/s2": "m/s2", "m/s/s": "m/s2", "m/sec2": "m/s2", "m/sec/sec": "m/s2", "mps2": "m/s2",
+    "ms-2": "m/s2", "m.s-2": "m/s2", "ms2": "m/s2",
+    "cm/s2": "cm/s2", "cm/s/s": "cm/s2", "cm/sec2": "cm/s2", "cm/sec/sec": "cm/s2",
+    "cms-2": "cm/s2", "cm.s-2": "cm/s2", "gal": "cm/s2", "gals": "cm/s2",
+}  # fmt: skip
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+
+
+def parse_unit(text: str, where: str = "Argument `units`") -> str:
+    """The canonical name (a key of `TO_SI`) of a unit of acceleration, however it is spelt."""
+    plain = re.sub(r"[\s^*{}]", "", str(text)).lower().replace("²", "2").replace("−", "-")
+    if plain in _SPELLINGS:
+        return _SPELLINGS[plain]
+    known = ", ".join(TO_SI)
+    raise InputError(f"{where} names the unknown unit {str(text)!r:.60}; known units are {known}.")
+
+
+def parse_acceleration(value: float | str, name: str) -> float:
+    """A positive acceleration [m/s^2] from a number (m/s^2) or from text such as ``0.4g``."""
+    if isinstance(value, str):
+        match = _QUANTITY.fullmatch(value)
+        if match is None or not match[2]:
+            raise argument_error(
+                name, "be a number with its unit", repr(value), "Write for example 0.4g or 3.9m/s2."
+            )
+        number = float(match[1]) * TO_SI[parse_unit(match[2], f"Argument `{name}`")]
+    else:
+        number = float(value)
+    if not (math.isfinite(number) and number > 0):
+        raise argument_error(name, "be a positive acceleration", repr(value))
+    return number
+
+
+def parse_spectral_target(value: str | tuple[float | str, float], name: str = "sa"):
+    """(acceleration [m/s^2], frequency [Hz]) from ``0.3g@2.29Hz``, ``0.3g@0.44s`` or a pair.
+
+    In a pair the first entry is what `parse_acceleration` takes and the second is in Hz.
+    """
+    wanted = "be an acceleration at a frequency or period"
+    remedy = "Write for example 0.3g@2.29Hz or 0.3g@0.44s."
+    if not isinstance(value, str):
+        try:
+            level, frequency = value
+            frequency = float(frequency)
+        except (TypeError, ValueError):
+            raise argument_error(name, wanted, repr(value), remedy) from None
+    else:
+        level, _, place = value.partition("@")
+        match = _QUANTITY.fullmatch(place)
+        if match is None or match[2].lower() not in ("hz", "s"):
+            raise argument_error(name, wanted, repr(value), remedy)
+        frequency = float(match[1])
+        if match[2].lower() == "s":
+            frequency = 1.0 / frequency if frequency else math.inf
+    if not (math.isfinite(frequency) and frequency > 0):
+        raise argument_error(name, wanted, repr(value), remedy)
+    return parse_acceleration(level, name), frequency
