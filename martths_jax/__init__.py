@@ -1,0 +1,52 @@
+"""martths_jax: fast, differentiable virtual multi-axial real-time hybrid simulation on JAX.
+
+    from martths_jax import ADFC, build_benchmark, draw_plants, indices, load_motion, simulate
+
+    benchmark = build_benchmark()
+    motion = load_motion("elcentro-like", scale=0.4, fs=1024)
+    result = simulate(benchmark, ADFC(), draw_plants(1000, seed=1), motion)
+    print(indices(result)["J2_1"].mean())
+"""
+
+from martths_jax import runtime  # first: float64 and the devices are set before JAX starts
+from martths_jax._version import __version__
+from martths_jax.benchmark import Benchmark, build_benchmark
+from martths_jax.controllers import ADFC, LQG, Controller, Decision, Observation, Passthrough
+from martths_jax.coupler import Coupler, build_coupler
+from martths_jax.errors import InputError
+from martths_jax.indices import indices
+from martths_jax.motions import Motion, load_motion
+from martths_jax.plant import IdealPlants, Plants, draw_plants, nominal_plant, plant_from_draws
+from martths_jax.sensors import SensorNoise
+from martths_jax.simulation import Result, simulate
+from martths_jax.structure.experimental import Quirks
+from martths_jax.watch import Status
+
+__all__ = [
+    "ADFC",
+    "LQG",
+    "Benchmark",
+    "Controller",
+    "Coupler",
+    "Decision",
+    "IdealPlants",
+    "InputError",
+    "Motion",
+    "Observation",
+    "Passthrough",
+    "Plants",
+    "Quirks",
+    "Result",
+    "SensorNoise",
+    "Status",
+    "__version__",
+    "build_benchmark",
+    "build_coupler",
+    "draw_plants",
+    "indices",
+    "load_motion",
+    "nominal_plant",
+    "plant_from_draws",
+    "runtime",
+    "simulate",
+]

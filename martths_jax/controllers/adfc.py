@@ -1,0 +1,193 @@
+"""Adaptive discrete feedforward controller (Calayir, Tao & Mercan 2025).
+
+The inverse of the plant is modelled as u = C_A' phi, where phi holds value and first three
+derivatives of both strokes, taken as backward differences.  C_A is the least-squares fit of the
+last N_b pairs (phi of the estimated strokes, command that caused them); the command then is the
+same model applied to the target strokes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from martths_jax.controllers.base import Controller, Decision
+from martths_jax.controllers.least_squares import SOLVERS, outer_packed
+from martths_jax.errors import InputError, argument_error
+from martths_jax.kalman import design_kalman
+
+#: Backward differences of second order for value and dt^j times the j-th derivative, from
+#: samples k, k-1, ..., k-4 (the paper's C_D, scaled so that the columns stay comparable).
+BACKWARD_DIFFERENCES = np.array(
+    [
+        [1.0, 0.0, 0.0, 0.0, 0.0],
+        [1.5, -2.0, 0.5, 0.0, 0.0],
+        [2.0, -5.0, 4.0, -1.0, 0.0],
+        [2.5, -9.0, 12.0, -7.0, 1.5],
+    ]
+)
+TAPS = BACKWARD_DIFFERENCES.shape[1]
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class ADFC(Controller):
+    """Adaptive feedforward by sliding least squares.
+
+    Attributes:
+        nb: buffer length N_b, rows in the fit.
+        no: overlap N_o of successive fits; a new C_A comes every N_b - N_o samples.
+        pull: weight lambda of the pull towards the start coefficients, added to the normal matrix
+            in scaled derivatives [mm^2]; 0 is the paper's literal least squares.
+        q: process noise of the Kalman filter [mm^2].
+        start: (8, 2) coefficients C_0 until the buffer is full; None follows the target (u = x_a).
+        solver: ``ldl`` (unrolled, fast) or ``lu`` (``jnp.linalg.solve``, the reference).
+        estimator: the Kalman filter, designed by ``prepare``.
+
+    Scalars may be given as arrays over trials (T,).
+    """
+
+    nb: int = field(default=1024, metadata={"static": True})
+    no: jax.Array | int = 1023
+    pull: jax.Array | float = 1e-5
+    q: jax.Array | float = 3e-5
+    start: jax.Array | None = None
+    solver: str = field(default="ldl", metadata={"static": True})
+    estimator: Any = None
+
+    name = "adfc"
+
+    def __post_init__(self):
+        numbers = (self.no, self.pull, self.q)
+        if all(type(x) in (int, float) for x in numbers):  # not when JAX rebuilds it from leaves
+            problems = self.problems(None)
+            if problems:
+                raise InputError(problems[0])
+
+    @property
+    def window(self) -> int:
+        return self.nb
+
+    def problems(self, benchmark):
+        found = []
+
+        def expect(good, name, wanted, got):
+            if not good:
+                found.append(str(argument_error(name, wanted, got)))
+
+        nb, no = self.nb, np.asarray(self.no)
+        whole = isinstance(nb, (int, np.integer))
+        expect(whole and nb >= 9, "nb", "be a whole number of at least 9 (8 unknowns)", nb)
+        if whole:
+            expect(np.all((no >= 0) & (no <= nb - 1)), "no", f"lie in [0, nb - 1 = {nb - 1}]", no)
+        pull = np.asarray(self.pull)
+        expect(np.all(np.isfinite(pull) & (pull >= 0)), "pull", "be zero or positive (mm^2)", pull)
+        q = np.asarray(self.q)
+        expect(np.all(np.isfinite(q) & (q > 0)), "q", "be positive (mm^2)", q)
+        expect(self.solver in SOLVERS, "solver", f"be one of {sorted(SOLVERS)}", self.solver)
+        if self.start is not None:
+            shape = np.shape(self.start)
+            expect(shape[:2] == (8, 2) and len(shape) in (2, 3), "start", "be (8, 2)", shape)
+        return found
+
+    def prepare(self, benchmark):
+        start = self.start
+        if start is None:
+            start = np.zeros((8, 2))
+            start[0, 0] = start[4, 1] = 1.0
+        start = jnp.asarray(start, dtype=float)
+        return replace(
+            self,
+            no=jnp.asarray(self.no),
+            pull=jnp.asarray(self.pull, dtype=float),
+            start=start if start.ndim == 3 else start[..., None],
+            estimator=design_kalman(benchmark.plant_model, self.q, benchmark.r_mm2),
+        )
+
+    def init(self, trials):
+        packed = tuple(jnp.zeros((8 - j, trials)) for j in range(8))
+        taps = jnp.zeros((TAPS, 2, trials))
+        return {
+            "coefficients": jnp.broadcast_to(self.start, (8, 2, trials)),
+            # Normal equations: rows of the window before, not yet left, and rows of this window.
+            "old": (packed, jnp.zeros((8, 2, trials))),
+            "new": (packed, jnp.zeros((8, 2, trials))),
+            # Last five samples of the estimate, of the estimate N_b samples ago, of the target.
+            "estimate": taps,
+            "leaving": taps,
+            "target": taps,
+            "command": jnp.zeros((2, trials)),
+        }
+
+    def blank_record(self, trials):
+        return jnp.zeros((2, trials)), jnp.zeros((2, trials))
+
+    def step(self, state, seen):
+        leaving_estimate, leaving_command = seen.delayed
+        estimate = push(state["estimate"], seen.estimate_mm)
+        leaving = push(state["leaving"], leaving_estimate)
+        target = push(state["target"], seen.target_mm)
+
+        # u(k-1) is the last command that the estimate at k can have felt.
+        applied = state["command"]
+        new = add(state["new"], products(regressor(estimate), applied))
+        old = subtract(state["old"], products(regressor(leaving), leaving_command))
+        rows, hop = seen.k + 1, self.nb - self.no
+        due = (rows >= self.nb) & ((rows - self.nb) % hop == 0)
+        coefficients = jnp.where(due, self.fit(add(old, new)), state["coefficients"])
+        command = jnp.sum(coefficients * regressor(target)[:, None], axis=0)
+        state = {
+            "coefficients": coefficients,
+            "old": old,
+            "new": new,
+            "estimate": estimate,
+            "leaving": leaving,
+            "target": target,
+            "command": command,
+        }
+        return state, Decision(command, (seen.estimate_mm, applied), {"C_A": coefficients})
+
+    def turn(self, state):
+        """Start a new window: the fresh sum of its rows replaces the sliding difference.
+
+        Adding and subtracting rows for ever would let round-off grow with the record; here every
+        sum is at most two windows old.
+        """
+        return state | {"old": state["new"], "new": jax.tree.map(jnp.zeros_like, state["new"])}
+
+    def fit(self, normal):
+        """C_A from the normal equations, pulled towards the start (8, 2, T)."""
+        packed, rhs = normal
+        packed = tuple(jnp.concatenate([c[:1] + self.pull, c[1:]]) for c in packed)
+        return SOLVERS[self.solver](packed, rhs + self.pull * self.start)
+
+
+def push(taps: jax.Array, newest: jax.Array) -> jax.Array:
+    """Shift the newest sample (2, T) into (5, 2, T) taps."""
+    return jnp.concatenate([newest[None], taps[:-1]])
+
+
+def regressor(taps: jax.Array) -> jax.Array:
+    """phi = [C_D x_1, C_D x_2] (8, T) of (5, 2, T) taps."""
+    rows = [sum(c * taps[i] for i, c in enumerate(row) if c) for row in BACKWARD_DIFFERENCES]
+    phi = jnp.stack(rows, axis=1)  # (2 actuators, 4 derivatives, T)
+    return phi.reshape(8, -1)
+
+
+def products(phi: jax.Array, command: jax.Array):
+    """What one row adds to the normal equations: phi phi' (packed) and phi u'."""
+    return outer_packed(phi), phi[:, None] * command
+
+
+def add(a, b):
+    """Sum of two pairs (normal matrix, right side)."""
+    return jax.tree.map(jnp.add, a, b)
+
+
+def subtract(a, b):
+    """Difference of two pairs (normal matrix, right side)."""
+    return jax.tree.map(jnp.subtract, a, b)

@@ -1,0 +1,96 @@
+"""LQG tracking control of the benchmark: state feedback on the estimate plus integral action."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy import linalg
+
+from martths_jax.controllers.base import Controller, Decision
+from martths_jax.errors import argument_error
+from martths_jax.kalman import design_kalman
+from martths_jax.structure.modal import contract
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class LQG(Controller):
+    """u(k) = -K_z z_hat(k) - K_e e(k), with e(k) = e(k-1) + dt (x_a(k) - x_m(k)).
+
+    Attributes:
+        K_z: (2, 2, m) or (2, 2, m, T) gain on the estimated plant state, slot by slot.
+        K_e: (2, 2) or (2, 2, T) gain on the integral of the tracking error [1/s].
+        estimator: the Kalman filter.
+        weights: what the gains were designed from, for the record.
+    """
+
+    K_z: jax.Array
+    K_e: jax.Array
+    estimator: Any
+    weights: tuple = field(default=(), metadata={"static": True})
+
+    name = "lqg"
+
+    @classmethod
+    def design(
+        cls,
+        benchmark,
+        *,
+        e: tuple[float, float] = (10**9.343, 10**3.648),
+        r: tuple[float, float] = (1.0, 10**-0.913),
+        y: tuple[float, float] = (10**2.836, 10**0.921),
+        q: float = 10**-1.82,
+    ) -> LQG:
+        """Gains from the continuous-time Riccati equation of the plant with integral action.
+
+        Minimises the integral of y_1 x_1^2 + y_2 x_2^2 + e' diag(e) e + u' diag(r) u for the
+        augmented state (z, e), e' = x_a - C z.
+
+        Args:
+            benchmark: gives the nominal plant and the sensor noise.
+            e: weights of the two integrated errors [1/s^2].
+            r: weights of the two commands [-].
+            y: weights of the two strokes [-].
+            q: process noise of the Kalman filter [mm^2].
+
+        The published weights are not known; the defaults are fitted to Table 4's LQG column.
+
+        Raises:
+            InputError: if a weight is not positive (y may be zero) or no solution exists.
+        """
+        for name, pair, low in (("e", e, 0.0), ("r", r, 0.0), ("y", y, -1e-300)):
+            pair = np.asarray(pair, dtype=float)
+            if pair.shape != (2,) or not np.all(np.isfinite(pair) & (pair > low)):
+                wanted = "be two positive numbers" if low == 0 else "be two non-negative numbers"
+                raise argument_error(name, wanted, pair.tolist())
+        A, B, C = benchmark.plant_continuous
+        n = A.shape[0]
+        A_aug = np.block([[A, np.zeros((n, 2))], [-C, np.zeros((2, 2))]])
+        B_aug = np.vstack([B, np.zeros((2, 2))])
+        Q = linalg.block_diag(C.T @ np.diag(y) @ C, np.diag(e))
+        try:
+            X = linalg.solve_continuous_are(A_aug, B_aug, Q, np.diag(r))
+        except (np.linalg.LinAlgError, ValueError) as error:
+            raise argument_error(
+                "e, r, y", "give a solvable Riccati equation", f"e={e}, r={r}, y={y} ({error})"
+            ) from None
+        K = np.linalg.solve(np.diag(r), B_aug.T @ X)
+        K_z = np.swapaxes(K[:, :n].reshape(2, n // 2, 2), 1, 2)
+        return cls(
+            K_z=jnp.asarray(K_z),
+            K_e=jnp.asarray(K[:, n:]),
+            estimator=design_kalman(benchmark.plant_model, q, benchmark.r_mm2),
+            weights=(("e", tuple(e)), ("r", tuple(r)), ("y", tuple(y)), ("q", float(q))),
+        )
+
+    def init(self, trials):
+        return jnp.zeros((2, trials))
+
+    def step(self, state, seen):
+        error = state + seen.dt * (seen.target_mm - seen.measured_mm)
+        command = -contract(self.K_z, seen.state, axes=2) - contract(self.K_e, error)
+        return error, Decision(command_mm=command, signals={"error_integral": error})

@@ -1,0 +1,143 @@
+"""The 24 evaluation indices of the benchmark, as running sums over a trajectory.
+
+J1, J4 are delays [ms]; J2, J5, J7, J8 root-mean-square errors and J3, J6, J9, J10 peak errors, in
+percent of the target (Condori Uribe et al. 2023, section on evaluation criteria; the numbers behind
+the underscore name the actuator or the degree of freedom).  All but the delays need four running
+values a pair of signals; the delays need the cross-correlation at a range of lags.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+#: The ten compared pairs: name of the RMS index, name of the peak index.
+PAIRS = (
+    ("J2_1", "J3_1"), ("J2_2", "J3_2"), ("J5_4", "J6_4"), ("J5_28", "J6_28"),
+    ("J7_4", "J9_4"), ("J7_28", "J9_28"), ("J8_2", "J10_2"), ("J8_26", "J10_26"),
+    ("J8_3", "J10_3"), ("J8_27", "J10_27"),
+)  # fmt: skip
+#: The four cross-correlated pairs: measured, then estimated strokes against their targets.
+DELAYS = ("J1_1", "J1_2", "J4_1", "J4_2")
+#: All indices in the order of Table 4.
+NAMES = (
+    "J1_1", "J1_2", "J2_1", "J2_2", "J3_1", "J3_2", "J4_1", "J4_2", "J5_4", "J5_28", "J6_4",
+    "J6_28", "J7_4", "J7_28", "J8_2", "J8_26", "J8_3", "J8_27", "J9_4", "J9_28", "J10_2",
+    "J10_26", "J10_3", "J10_27",
+)  # fmt: skip
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class IndexSums:
+    """What a run accumulates, trials on the last axis.
+
+    Attributes:
+        error_square, target_square: (10, T) sums of squares of the ``PAIRS``.
+        error_peak, target_peak: (10, T) largest magnitudes.
+        correlation: (lags, 4, T) cross-correlations of ``DELAYS``.
+        lags: (lead, lag): the correlation covers -lead ... lag samples.
+        fs: sampling rate [Hz].
+    """
+
+    error_square: jax.Array
+    target_square: jax.Array
+    error_peak: jax.Array
+    target_peak: jax.Array
+    correlation: jax.Array
+    lags: tuple[int, int] = field(metadata={"static": True})
+    fs: float = field(metadata={"static": True})
+
+
+def pairs(signals: Mapping[str, jax.Array], reference: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Values and targets (10, T) of the ``PAIRS`` at one sample.
+
+    Args:
+        signals: ``x_a``, ``x_m`` (2, T) [mm], ``num`` (6, T), ``est`` (2, T) [m, rad].
+        reference: (6, 1) response of the reference structure in the order of ``num``.
+    """
+    num, est = signals["num"], signals["est"]
+    reference = jnp.broadcast_to(reference, num.shape)
+    value = jnp.concatenate([signals["x_m"], est, est, num[2:]])
+    target = jnp.concatenate([signals["x_a"], num[:2], reference])
+    return value, target
+
+
+def correlate(y: jax.Array, x: jax.Array, lags: tuple[int, int]) -> jax.Array:
+    """Products sum_k y(k) x(k - l) for l = -lead ... lag.
+
+    Args:
+        y: (n, ..., T) samples w ... w + n - 1.
+        x: (n + lead + lag, ..., T) samples w - lag ... w + n - 1 + lead.
+        lags: (lead, lag) [samples].
+
+    Returns:
+        (lead + lag + 1, ..., T).
+    """
+    lead, lag = lags
+    n = y.shape[0]
+    if lead + lag < 64:
+        return jnp.stack([jnp.sum(y * x[lag - l : lag - l + n], 0) for l in range(-lead, lag + 1)])
+
+    def one(l):
+        return jnp.sum(y * jax.lax.dynamic_slice_in_dim(x, lag - l, n), 0)
+
+    return jax.lax.map(one, jnp.arange(-lead, lag + 1))
+
+
+def delay_ms(sums: IndexSums, interpolate: bool) -> jax.Array:
+    """(4, T) lags of the largest cross-correlations, positive = late [ms].
+
+    Args:
+        interpolate: refine the whole-sample lag by the parabola through its neighbours.
+    """
+    r = sums.correlation
+    best = jnp.argmax(r, axis=0)
+    lag = (best - sums.lags[0]).astype(float)
+    if interpolate:
+        inside = jnp.clip(best, 1, r.shape[0] - 2)
+        left, middle, right = (
+            jnp.take_along_axis(r, (inside + d)[None], axis=0)[0] for d in (-1, 0, 1)
+        )
+        bend = left - 2 * middle + right
+        offset = jnp.where(bend < 0, (left - right) / (2 * jnp.where(bend < 0, bend, 1.0)), 0.0)
+        lag = lag + jnp.where(inside == best, jnp.clip(offset, -0.5, 0.5), 0.0)
+    return lag / sums.fs * 1e3
+
+
+def peak_at_edge(sums: IndexSums) -> jax.Array:
+    """(T,) whether a correlation peaks at the end of its range, so that the delay is a bound."""
+    best = jnp.argmax(sums.correlation, axis=0)
+    return jnp.any((best == 0) | (best == sums.correlation.shape[0] - 1), axis=0)
+
+
+def indices_of(sums: IndexSums, interpolate: bool = False) -> dict[str, jax.Array]:
+    """The 24 indices (T,) from the sums of a run; differentiable except for the delays."""
+    rms = 100 * jnp.sqrt(sums.error_square / sums.target_square)
+    peak = 100 * sums.error_peak / sums.target_peak
+    found = dict(zip(DELAYS, delay_ms(sums, interpolate), strict=True))
+    for (rms_name, peak_name), r, p in zip(PAIRS, rms, peak, strict=True):
+        found[rms_name], found[peak_name] = r, p
+    return {name: found[name] for name in NAMES}
+
+
+def indices(result, *, interpolate: bool = False) -> dict[str, np.ndarray]:
+    """The 24 indices of every trial.
+
+    Args:
+        result: what ``simulate`` returned.
+        interpolate: give J1 and J4 between the samples, by a parabola through the peak.
+
+    Returns:
+        Mapping from ``J1_1`` ... ``J10_27`` to arrays (trials,): J1, J4 in ms, the others in
+        percent.  Trials that diverged have NaN throughout; see ``result.status``.
+    """
+    found = indices_of(result.sums, interpolate)
+    if isinstance(result.sums.error_square, jax.core.Tracer):
+        return found
+    lost = np.asarray(result.lost)
+    return {name: np.where(lost, np.nan, np.asarray(value)) for name, value in found.items()}

@@ -1,0 +1,105 @@
+"""Steady-state Kalman filter on the nominal plant, in its current-estimate form.
+
+Each sample first corrects the prediction with the measurement of the same sample, then predicts
+the next one with the command:
+
+    x_hat(k) = x_pred(k) + L (y(k) - C x_pred(k)),   x_pred(k+1) = A x_hat(k) + B u(k)
+
+L is the *filter gain* P C' (C P C' + R)^-1; the *predictor gain* of the one-step form is A L.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy import linalg
+
+from martths_jax.errors import argument_error
+from martths_jax.structure.modal import ModalSystem, advance, output, to_dense
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class KalmanFilter:
+    """Filter of the actuator strokes.
+
+    Attributes:
+        model: nominal plant, m slots.
+        filter_gain: (2, m, 2) or (2, m, 2, T), L above, slot by slot.
+    """
+
+    model: ModalSystem
+    filter_gain: jax.Array
+
+    def init(self, trials: int) -> jax.Array:
+        """Prediction for k = 0: the plant at rest, (2, m, T)."""
+        return jnp.zeros(self.model.a.shape[:2] + (trials,))
+
+    def correct(self, predicted: jax.Array, measured_mm: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """Corrected state (2, m, T) and estimated strokes (2, T) [mm]."""
+        innovation = measured_mm - output(self.model, predicted)
+        gain = self.filter_gain if self.filter_gain.ndim == 4 else self.filter_gain[..., None]
+        state = predicted + jnp.sum(gain * innovation, axis=2)
+        return state, output(self.model, state)
+
+    def predict(self, state: jax.Array, command_mm: jax.Array) -> jax.Array:
+        """Prediction for the next sample from the corrected state and the command (2, T)."""
+        return advance(self.model, state, command_mm)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class DirectMeasurement:
+    """No filter: the estimate is the measurement (for ideal sensors)."""
+
+    def init(self, trials: int) -> jax.Array:
+        """Nothing to remember, (2, 0, T)."""
+        return jnp.zeros((2, 0, trials))
+
+    def correct(self, predicted, measured_mm):
+        """The measurement itself."""
+        return predicted, measured_mm
+
+    def predict(self, state, command_mm):
+        """Nothing to predict."""
+        return state
+
+
+def steady_state_gains(A, B, C, q: float, r: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Steady-state Kalman gains of x(k+1) = A x + B (u + w), y = C x + v.
+
+    Args:
+        A, B, C: (n, n), (n, i), (o, n) discrete plant.
+        q: variance of the process noise w on each input [mm^2]; Q = q B B'.
+        r: variance of the measurement noise v on each output [mm^2].
+
+    Returns:
+        filter gain L (n, o), predictor gain A L (n, o), prediction covariance P (n, n).
+    """
+    P = linalg.solve_discrete_are(A.T, C.T, q * B @ B.T, r * np.eye(C.shape[0]))
+    L = linalg.solve(C @ P @ C.T + r * np.eye(C.shape[0]), C @ P, assume_a="pos").T
+    return L, A @ L, P
+
+
+def design_kalman(model: ModalSystem, q: float, r: float) -> KalmanFilter:
+    """Kalman filter of a plant.
+
+    Args:
+        model: nominal plant (T = 1).
+        q: process noise through the plant's input [mm^2].
+        r: measurement noise a sample [mm^2].
+
+    Raises:
+        InputError: if q or r is not positive and finite.
+    """
+    for name, value in (("q", q), ("r", r)):
+        if not (np.isfinite(value) and value > 0):
+            raise argument_error(name, "be positive and finite (mm^2)", value)
+    A, B, C, _ = to_dense(model)
+    L, _, _ = steady_state_gains(A, B, C, q, r)
+    m = model.a.shape[1]
+    slots = np.transpose(L.reshape(m, 2, -1), (1, 0, 2))
+    return KalmanFilter(model=model, filter_gain=jnp.asarray(slots))

@@ -1,0 +1,235 @@
+"""One sample period, and the one scan over time that repeats it.
+
+Everything here is pure: what stays (benchmark, controller, plants) and what moves (``LoopState``) are
+pytrees, trials stand on the last axis.  ``sample_period`` read from top to bottom is the physics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from martths_jax import watch as watching
+from martths_jax.benchmark import Benchmark
+from martths_jax.controllers import Controller, Observation
+from martths_jax.coupler import actuator_to_frame, frame_to_actuator
+from martths_jax.indices import IndexSums, correlate, pairs
+from martths_jax.structure.modal import ModalSystem, advance, contract, output
+
+#: Length of the time loop's windows for controllers that keep none [samples].
+WINDOW = 1024
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class LoopState:
+    """What moves, at the start of sample k.
+
+    Attributes:
+        structure: (2, n, T) state of the numerical substructure.
+        plant: (2, m, T) state of the plants.
+        filter: state of the estimator, predicted for k.
+        interface: (2, 2, T) estimated interface motion at k-1 and k-2.
+        controller: state of the controller.
+    """
+
+    structure: jax.Array
+    plant: jax.Array
+    filter: jax.Array
+    interface: jax.Array
+    controller: Any
+
+
+def initial_state(
+    benchmark: Benchmark, controller: Controller, plant: ModalSystem, trials: int
+) -> LoopState:
+    """Everything at rest."""
+    at_rest = lambda system: jnp.zeros(system.a.shape[:2] + (trials,))  # noqa: E731
+    return LoopState(
+        structure=at_rest(benchmark.numerical),
+        plant=at_rest(plant),
+        filter=controller.estimator.init(trials),
+        interface=jnp.zeros((2, 2, trials)),
+        controller=controller.init(trials),
+    )
+
+
+def sample_period(
+    benchmark: Benchmark,
+    controller: Controller,
+    plant: ModalSystem,
+    state: LoopState,
+    k: jax.Array,
+    ground: jax.Array,
+    noise: jax.Array,
+    delayed: Any,
+) -> tuple[LoopState, dict[str, jax.Array], Any]:
+    """Advance a batch of trials by one sample.
+
+    Args:
+        k: number of the sample.
+        ground: ground acceleration at k [m/s^2], a scalar.
+        noise: (1 or 2, T or 1) sensor noise at k [mm].
+        delayed: the controller's record of ``window`` samples ago.
+
+    Returns:
+        state at k + 1, signals at k, the controller's record.
+    """
+    # What the sensors and the filter know of the strokes at k.
+    measured = output(plant, state.plant) + noise
+    corrected, estimate = controller.estimator.correct(state.filter, measured)
+
+    # Estimated interface motion and the force of the experimental frame; its velocity and
+    # acceleration are backward differences, zero at the first sample.
+    interface = actuator_to_frame(benchmark.coupler, estimate)
+    before = jnp.where(k == 0, interface, state.interface)
+    force = contract(benchmark.restoring[0], interface)
+    force += contract(benchmark.restoring[1], before[0])
+    force += contract(benchmark.restoring[2], before[1])
+
+    # Numerical substructure under its own inertia and that force.
+    load = jnp.concatenate([jnp.broadcast_to(ground, force[:1].shape), -force])
+    numerical = output(benchmark.numerical, state.structure, load)
+    target = frame_to_actuator(benchmark.coupler, numerical[:2])
+
+    seen = Observation(k, benchmark.dt, target, measured, estimate, corrected, delayed)
+    controller_state, decision = controller.step(state.controller, seen)
+    command = decision.command_mm
+
+    after = LoopState(
+        structure=advance(benchmark.numerical, state.structure, load),
+        plant=advance(plant, state.plant, command),
+        filter=controller.estimator.predict(corrected, command),
+        interface=jnp.stack([interface, before[0]]),
+        controller=controller_state,
+    )
+    signals = {
+        "x_a": target,
+        "x_m": measured,
+        "x_hat": estimate,
+        "u": command,
+        "num": numerical,
+        "est": interface,
+        "force": force,
+    }
+    return after, signals | decision.signals, decision.record
+
+
+def run(
+    benchmark: Benchmark,
+    controller: Controller,
+    plant: ModalSystem,
+    ground: jax.Array,
+    reference: jax.Array,
+    noise: jax.Array,
+    *,
+    trials: int,
+    lags: tuple[int, int],
+    keep: int = 0,
+) -> tuple[IndexSums, watching.Watch, dict[str, jax.Array]]:
+    """Run a batch of trials over a whole motion.
+
+    The scan over time is nested: windows of the controller's buffer length outside, samples
+    inside.  The rows that a window writes are what the next one hands back as ``delayed``.
+
+    Args:
+        benchmark, controller: what stays; the controller is prepared.
+        plant: discretised plants.
+        ground: (N,) ground acceleration [m/s^2].
+        reference: (N, 6) response of the reference structure.
+        noise: (N, 1 or 2, T or 1) sensor noise [mm].
+        trials: number T of trials in the batch.
+        lags: (lead, lag) range of the cross-correlations [samples].
+        keep: return the signals of the first so many trials too.
+
+    Returns:
+        sums for the indices, watch for the status, signals (N, ..., T) (empty if `keep` is 0).
+    """
+    N = ground.shape[0]
+    length = controller.window or WINDOW
+    windows = -(-N // length)
+
+    def in_windows(x):
+        padded = jnp.pad(x, [(0, windows * length - N)] + [(0, 0)] * (x.ndim - 1))
+        return padded.reshape(windows, length, *x.shape[1:])
+
+    def sample(moving, inputs):
+        state, sums, watch = moving
+        k, ground_k, reference_k, noise_k, delayed = inputs
+        state, signals, record = sample_period(
+            benchmark, controller, plant, state, k, ground_k, noise_k, delayed
+        )
+        valid = k < N
+        sums = _accumulate(sums, signals, reference_k[:, None], valid)
+        watch = watching.update(watch, k, valid, signals)
+        strokes = jnp.stack([signals[name] for name in ("x_a", "x_m", "x_hat")])
+        strokes = jnp.where(valid, strokes, 0.0)
+        kept = {name: x[..., :keep] for name, x in signals.items()} if keep else {}
+        return (state, sums, watch), (strokes, record, kept)
+
+    def window(carry, inputs):
+        moving, records, tail, correlation = carry
+        moving, (strokes, records, signals) = jax.lax.scan(sample, moving, (*inputs, records))
+        state, sums, watch = moving
+        state = replace(state, controller=controller.turn(state.controller))
+        added, tail = _correlate_window(tail, strokes, lags)
+        return ((state, sums, watch), records, tail, correlation + added), signals
+
+    blank = controller.blank_record(trials)
+    records = jax.tree.map(lambda x: jnp.zeros((length, *x.shape), x.dtype), blank)
+    state = initial_state(benchmark, controller, plant, trials)
+    carry = (
+        (state, (jnp.zeros((10, trials)),) * 4, watching.init(trials)),
+        records,
+        jnp.zeros((sum(lags), 3, 2, trials)),
+        jnp.zeros((sum(lags) + 1, 2, 2, trials)),
+    )
+    samples = jnp.arange(windows * length).reshape(windows, length)
+    inputs = (samples, *map(in_windows, (ground, reference, noise)))
+    carry, signals = jax.lax.scan(window, carry, inputs)
+
+    (_, sums, watch), _, tail, correlation = carry
+    # The last `lead` samples still wait for targets that come after them: none do.
+    correlation += _correlate_window(tail, jnp.zeros((lags[0], *tail.shape[1:])), lags)[0]
+    signals = jax.tree.map(lambda x: x.reshape(windows * length, *x.shape[2:])[:N], signals)
+    index_sums = IndexSums(
+        *sums,
+        correlation=correlation.reshape(-1, 4, trials),
+        lags=lags,
+        fs=benchmark.fs,
+    )
+    return index_sums, watch, signals
+
+
+def _accumulate(sums, signals, reference, valid):
+    """Running sums of squares and peaks of the ten pairs, see ``IndexSums``."""
+    value, target = pairs(signals, reference)
+    error = jnp.where(valid, value - target, 0.0)
+    target = jnp.where(valid, target, 0.0)
+    error_square, target_square, error_peak, target_peak = sums
+    return (
+        error_square + error**2,
+        target_square + target**2,
+        jnp.maximum(error_peak, jnp.abs(error)),
+        jnp.maximum(target_peak, jnp.abs(target)),
+    )
+
+
+def _correlate_window(tail, strokes, lags):
+    """Cross-correlations that a window adds, and the tail that the next one needs.
+
+    Args:
+        tail: (lead + lag, 3, 2, T) the last strokes of the windows before.
+        strokes: (n, 3, 2, T) targets, measured and estimated strokes of this window.
+        lags: (lead, lag).
+
+    Returns:
+        (lead + lag + 1, 2, 2, T) correlations of (measured, estimated) x actuator; the new tail.
+    """
+    n, both = strokes.shape[0], jnp.concatenate([tail, strokes])
+    y = both[lags[1] : lags[1] + n, 1:]
+    x = both[:, :1]
+    return correlate(y, x, lags), both[n:]

@@ -1,0 +1,295 @@
+"""The control plant: two actuators with their controllers, pushing one frame (mm in, mm out).
+
+    H_ij(s) = k_ij prod(s - z) / prod(s - p),   i = output, j = input
+
+Column j of H shares its poles, so it is one four-state system with two outputs; the frame's pole
+pair stands in both columns.  All poles are simple and known, so the modal form and its zero-order
+hold are written down exactly (partial fractions) instead of being computed from a matrix
+exponential: cheap for 100 000 plants, and differentiable in every zero and pole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from martths_jax.errors import InputError, argument_error
+from martths_jax.structure.modal import ModalSystem
+
+HZ = 2 * np.pi  # rad/s per Hz
+#: The nine uncertain parameters in the order of the draws.
+PARAMETERS = (
+    "zero1_col1", "zero2_col1", "pole1_col1", "pole2_col1", "frame_pair",
+    "zero_h12", "zero_h22", "pole1_col2", "pole2_col2",
+)  # fmt: skip
+#: Nominal zeros and poles [Hz]; the frame pair's entry scales ``FRAME_POLE_HZ``.
+NOMINAL_HZ = np.array([-120.0, -90.0, -2.65, -40.0, 1.0, -3.0, -5.0, -3.5, -18.5])
+FRAME_POLE_HZ = complex(-50.0, 63.0)
+#: Relative standard deviation of each parameter (paper, Table 2).
+SIGMA = np.array([0.055, 0.055, 0.06, 0.06, 0.05, 0.03, 0.03, 0.03, 0.03])
+#: k_ij of the nominal plant, output by row.
+NOMINAL_GAIN = np.array([[2165.2, 4.5394e6], [349.95, 1.9238e7]])
+
+PLANT_STREAM = 0  # separates plant draws from noise draws of the same seed
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Plants:
+    """A batch of T plants, given by how far each parameter is from nominal.
+
+    Attributes:
+        draws: (T, 9) standard normal draws in the order of ``PARAMETERS``.
+        trial: (T,) numbers of the trials, which also select their sensor noise.
+        spread: scale on every standard deviation of Table 2 [-].
+    """
+
+    draws: jax.Array
+    trial: jax.Array
+    spread: jax.Array | float = 1.0
+
+    def __len__(self) -> int:
+        return self.draws.shape[0]
+
+    def __getitem__(self, which) -> Plants:
+        """The chosen trials, which keep their numbers; an integer gives a batch of one."""
+        if isinstance(which, (int, np.integer)):
+            which = [which]
+        index = np.arange(len(self))[which]
+        return Plants(self.draws[index], self.trial[index], self.spread)
+
+    @property
+    def parameters_hz(self) -> jax.Array:
+        """(T, 9) zeros and poles [Hz]; the frame pair's entry is the factor on the pair."""
+        return NOMINAL_HZ * (1 + SIGMA * self.spread * self.draws)
+
+    def discretise(self, dt: float) -> ModalSystem:
+        """Zero-order-hold discretisation of every plant at `dt` [s]."""
+        return discretise_parameters(self.parameters_hz, dt)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class IdealPlants:
+    """Actuators that reach every command one sample later, exactly: x_m(k+1) = u(k)."""
+
+    trial: jax.Array
+
+    def __len__(self) -> int:
+        return self.trial.shape[0]
+
+    def __getitem__(self, which) -> IdealPlants:
+        if isinstance(which, (int, np.integer)):
+            which = [which]
+        return IdealPlants(self.trial[np.arange(len(self))[which]])
+
+    def discretise(self, dt: float) -> ModalSystem:
+        """One state per actuator that holds the last command."""
+        T = len(self)
+        zeros = jnp.zeros((2, 1, T))
+        unit = jnp.broadcast_to(jnp.eye(2)[:, None, :, None], (2, 1, 2, T))
+        return ModalSystem(
+            a=zeros, b=zeros, B=unit, C=jnp.broadcast_to(jnp.eye(2)[:, :, None, None], (2, 2, 1, T))
+        )
+
+
+def draw_plants(n: int, seed: int = 0, *, first: int = 1, spread: float = 1.0) -> Plants:
+    """Draw uncertain plants (paper, Table 2); trial i depends on (seed, i) alone.
+
+    Args:
+        n: how many.
+        seed: seed of the study.
+        first: number of the first trial; trial 0 is the nominal plant by convention, so draws
+            start at 1.
+        spread: factor on the standard deviations [-].
+
+    Returns:
+        Trials first ... first + n - 1.
+    """
+    if n < 1:
+        raise argument_error("n", "be a whole number of at least 1", n)
+    trial = jnp.arange(first, first + n)
+    stream = jax.random.fold_in(jax.random.key(seed), PLANT_STREAM)
+    draw = jax.vmap(lambda i: jax.random.normal(jax.random.fold_in(stream, i), (9,)))
+    return check_plants(Plants(draw(trial), trial, float(spread)))
+
+
+def plant_from_draws(draws, *, trial=None, spread: float = 1.0) -> Plants:
+    """Plants from given standard normal draws; ``zeros(9)`` is the nominal plant.
+
+    Args:
+        draws: (9,) or (T, 9), in the order zero 1, zero 2, pole 1, pole 2 of column 1, frame pair,
+            zero of H12, zero of H22, pole 1, pole 2 of column 2.
+        trial: (T,) trial numbers; 0, 1, ... by default.
+        spread: factor on the standard deviations of Table 2 [-].
+
+    Raises:
+        InputError: for a wrong shape, a value that is not finite, or an unstable plant.
+    """
+    draws = jnp.asarray(draws, dtype=float)
+    if draws.shape[-1:] != (9,) or draws.ndim not in (1, 2) or draws.size == 0:
+        raise argument_error(
+            "draws",
+            "have shape (9,) or (trials, 9)",
+            f"shape {draws.shape}",
+            f"The nine columns are {', '.join(PARAMETERS)}.",
+        )
+    draws = draws.reshape(-1, 9)
+    trial = jnp.arange(draws.shape[0]) if trial is None else jnp.asarray(trial)
+    return check_plants(Plants(draws, trial, float(spread)))
+
+
+def nominal_plant() -> Plants:
+    """The nominal plant, trial 0."""
+    return plant_from_draws(np.zeros(9))
+
+
+def check_plants(plants: Plants) -> Plants:
+    """Refuse draws that are not finite and plants with a pole that is not in the left half-plane.
+
+    Raises:
+        InputError: naming the first such trial and parameter.
+    """
+    if isinstance(plants.draws, jax.core.Tracer):
+        return plants
+    draws, values = np.asarray(plants.draws), np.asarray(plants.parameters_hz)
+    bad = np.argwhere(~np.isfinite(draws))
+    if bad.size:
+        row, column = bad[0]
+        raise argument_error(
+            "draws", "be finite", f"{draws[row, column]} for {PARAMETERS[column]} in row {row}"
+        )
+    poles = [2, 3, 4, 7, 8]
+    unstable = np.argwhere(values[:, poles] * np.sign(NOMINAL_HZ[poles]) <= 0)
+    if unstable.size:
+        row, column = unstable[0][0], poles[unstable[0][1]]
+        raise InputError(
+            f"Argument `draws` must give stable plants, but row {row} moves {PARAMETERS[column]} "
+            f"to {values[row, column]:.3g} (nominal {NOMINAL_HZ[column]:g}); keep the draw above "
+            f"{-1 / (SIGMA[column] * float(plants.spread)):.1f}."
+        )
+    return plants
+
+
+def _factors(parameters_hz: jax.Array):
+    """Zeros, real poles, frame pole [rad/s] and rescaled gains of a batch of plants.
+
+    Returns:
+        zeros: per output and column, list of (T,) arrays; poles: per column (p1, p2); frame: (T,)
+        complex; gain: (2, 2, T), rescaled so that the DC gain stays nominal.
+    """
+    s = jnp.moveaxis(jnp.asarray(parameters_hz), -1, 0) * HZ
+    z1, z2, p1, p2, frame, z12, z22, p3, p4 = s
+    frame = frame * FRAME_POLE_HZ
+    zeros = [[(z1, z2), (z12,)], [(z1, z2), (z22,)]]
+    poles = [(p1, p2), (p3, p4)]
+    n = NOMINAL_HZ * HZ
+    nominal_zeros = [[(n[0], n[1]), (n[5],)], [(n[0], n[1]), (n[6],)]]
+    nominal_poles = [(n[2], n[3]), (n[7], n[8])]
+    pair = abs(FRAME_POLE_HZ * HZ) ** 2
+    gain = []
+    for i in range(2):
+        row = []
+        for j in range(2):
+            dc = NOMINAL_GAIN[i, j] * np.prod([-z for z in nominal_zeros[i][j]])
+            dc = dc / (np.prod([-p for p in nominal_poles[j]]) * pair)
+            numerator = jnp.prod(jnp.stack([-z for z in zeros[i][j]]), axis=0)
+            row.append(dc * poles[j][0] * poles[j][1] * (frame * frame.conj()).real / numerator)
+        gain.append(row)
+    return zeros, poles, frame, gain
+
+
+def frequency_response(parameters_hz, frequency_hz) -> jax.Array:
+    """H(j 2 pi f) of a batch of plants.
+
+    Args:
+        parameters_hz: (T, 9) as in ``Plants.parameters_hz``.
+        frequency_hz: (F,) frequencies [Hz].
+
+    Returns:
+        (F, 2, 2, T) complex response, mm a mm.
+    """
+    zeros, poles, frame, gain = _factors(parameters_hz)
+    s = 2j * jnp.pi * jnp.asarray(frequency_hz)[:, None]
+
+    def entry(i, j):
+        numerator = gain[i][j] * jnp.ones_like(s)
+        for z in zeros[i][j]:
+            numerator = numerator * (s - z)
+        p, q = poles[j]
+        return numerator / ((s - p) * (s - q) * (s - frame) * (s - frame.conj()))
+
+    return jnp.stack([jnp.stack([entry(i, j) for j in range(2)], 1) for i in range(2)], 1)
+
+
+def continuous_modes(parameters_hz: jax.Array):
+    """Partial fractions of a batch of plants.
+
+    Returns:
+        poles: (4, T) complex: real pair of column 1, its frame pole, then the same of column 2
+            as (p1, p2, frame) -> arrays ``real`` (2 columns, 2, T) and ``frame`` (T,).
+        residues: ``real`` (2 outputs, 2 columns, 2, T) and ``frame`` (2 outputs, 2 columns, T).
+    """
+    zeros, poles, frame, gain = _factors(parameters_hz)
+    real_residue, frame_residue = [], []
+    for i in range(2):
+        row_real, row_frame = [], []
+        for j in range(2):
+            p, q = poles[j]
+
+            def numerator(s, i=i, j=j):
+                value = gain[i][j]
+                for z in zeros[i][j]:
+                    value = value * (s - z)
+                return value
+
+            pair_p = ((p - frame) * (p - frame.conj())).real
+            pair_q = ((q - frame) * (q - frame.conj())).real
+            row_real.append(
+                jnp.stack([numerator(p) / ((p - q) * pair_p), numerator(q) / ((q - p) * pair_q)])
+            )
+            row_frame.append(
+                numerator(frame) / ((frame - p) * (frame - q) * (frame - frame.conj()))
+            )
+        real_residue.append(jnp.stack(row_real))
+        frame_residue.append(jnp.stack(row_frame))
+    real = jnp.stack([jnp.stack(pair) for pair in poles])
+    return real, frame, jnp.stack(real_residue), jnp.stack(frame_residue)
+
+
+def discretise_parameters(parameters_hz: jax.Array, dt: float) -> ModalSystem:
+    """Zero-order hold of a batch of plants, in modal form.
+
+    Slots: real pair and frame pair of column 1, then of column 2.  The states are those of the
+    continuous modal form z' = p z + u, sampled, so a gain designed in continuous time holds.
+
+    Args:
+        parameters_hz: (T, 9) zeros and poles [Hz].
+        dt: sample period [s].
+    """
+    real, frame, real_residue, frame_residue = continuous_modes(parameters_hz)
+    T = frame.shape[0]
+    decay, turn = jnp.exp(real * dt), jnp.exp(frame * dt)
+    push, push_frame = (decay - 1) / real, (turn - 1) / frame
+    a = jnp.stack([decay[0], jnp.stack([turn.real] * 2), decay[1], jnp.stack([turn.real] * 2)], 1)
+    swap = jnp.stack([-turn.imag, turn.imag])
+    b = jnp.stack([jnp.zeros((2, T)), swap, jnp.zeros((2, T)), swap], 1)
+    frame_input = jnp.stack([push_frame.real, push_frame.imag])
+    column = [jnp.stack([push[j], frame_input], 1) for j in range(2)]  # (2, 2 slots, T)
+    none = jnp.zeros((2, 2, T))
+    B = jnp.stack(
+        [jnp.concatenate([column[0], none], 1), jnp.concatenate([none, column[1]], 1)], 2
+    )
+    rows = []
+    for i in range(2):
+        slots = []
+        for j in range(2):
+            slots.append(real_residue[i, j])
+            slots.append(
+                jnp.stack([2 * frame_residue[i, j].real, -2 * frame_residue[i, j].imag])
+            )
+        rows.append(jnp.stack(slots, 1))
+    return ModalSystem(a=a, b=b, B=B, C=jnp.stack(rows))

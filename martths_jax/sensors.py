@@ -1,0 +1,75 @@
+"""Displacement sensors: band-limited white noise on the measured strokes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+
+from martths_jax.errors import argument_error
+
+NOISE_STREAM = 1  # separates noise draws from plant draws of the same seed
+BLOCK = 1024  # samples drawn from one key, so that a longer record only adds to a shorter one
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """White noise of the two displacement sensors.
+
+    The noise of trial i depends on (seed, i) alone: not on the record's length, the controller, or
+    which other trials run.
+
+    Attributes:
+        power: power spectral density [mm^2 s]; the variance of a sample is power * fs.
+        shared: both sensors see the same sequence, as in the benchmark; False draws two.
+        seed: seed of the study.
+    """
+
+    power: float = 1.5e-7
+    shared: bool = True
+    seed: int = 0
+
+    def __post_init__(self):
+        if not (self.power >= 0 and self.power < float("inf")):
+            raise argument_error("power", "be zero or positive and finite (mm^2 s)", self.power)
+
+    @property
+    def channels(self) -> int:
+        """1 if both sensors share a sequence, else 2."""
+        return 1 if self.shared else 2
+
+    def variance(self, fs: float) -> float:
+        """Variance of one sample [mm^2]."""
+        return self.power * fs
+
+    def draw(self, trial: jax.Array, samples: int, fs: float) -> jax.Array:
+        """Noise of the given trials.
+
+        Args:
+            trial: (T,) trial numbers.
+            samples: record length N.
+            fs: sampling rate [Hz].
+
+        Returns:
+            (N, channels, T) noise [mm].
+        """
+        unit = unit_noise(self.seed, trial, samples, self.channels)
+        return unit * jnp.sqrt(self.variance(fs))
+
+
+def unit_noise(seed: int, trial: jax.Array, samples: int, channels: int) -> jax.Array:
+    """(N, channels, T) standard normal sequences of the given trials."""
+    stream = jax.random.fold_in(jax.random.key(seed), NOISE_STREAM)
+    blocks = -(-samples // BLOCK)
+
+    def one_block(i, block):
+        key = jax.random.fold_in(jax.random.fold_in(stream, i), block)
+        return jax.random.normal(key, (channels, BLOCK))
+
+    def block_of_all(block):
+        return jnp.moveaxis(jax.vmap(lambda i: one_block(i, block))(trial), 0, -1)
+
+    noise = jax.lax.map(block_of_all, jnp.arange(blocks))  # (blocks, channels, BLOCK, T)
+    noise = jnp.swapaxes(noise, 1, 2).reshape(blocks * BLOCK, channels, -1)
+    return noise[:samples]

@@ -1,0 +1,81 @@
+"""Sections, geometry and masses of the benchmark's three-storey, three-bay steel frame.
+
+Source: Condori Uribe et al. 2023 (Front. Built Environ. 9:1270996) and its public companion
+package.  Only the published section properties are stored; every matrix is assembled from them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+INCH = 0.0254  # m
+KSI = 6.894757293168361e6  # Pa
+
+
+@dataclass(frozen=True)
+class Section:
+    """Cross-section of a Timoshenko member.
+
+    Attributes:
+        A: area [m^2]; zero for beams, whose axial force the rigid diaphragm carries.
+        I: second moment of area [m^4].
+        A_s: shear area [m^2].
+    """
+
+    A: float
+    I: float
+    A_s: float
+
+    @classmethod
+    def from_inches(cls, A: float, I: float, A_s: float) -> Section:
+        """Section from in^2, in^4 and in^2, as steel tables print them."""
+        return cls(A * INCH**2, I * INCH**4, A_s * INCH**2)
+
+
+W5X16 = Section.from_inches(4.71, 21.4, 1.2024)
+S3X5_7 = Section.from_inches(1.66, 2.5, 0.51)
+# The built-up beams' plates are cut to fractions of an inch, so their second moments of area are
+# whole multiples of 2^-11 in^4; in print they are rounded to 1.107422 and 0.27588.
+BU_1 = Section.from_inches(0.0, 2268 / 2048, 0.84375)
+BU_2 = Section.from_inches(0.0, 565 / 2048, 0.25)
+
+
+@dataclass(frozen=True)
+class FrameGeometry:
+    """Geometry, sections and lumped masses of the reference frame.
+
+    Nodes are numbered column line by column line from the ground floor up: line 1 has nodes
+    1, 2, 3 (floors 1, 2, 3), line 2 has 4, 5, 6, and so on.  Node 4 is the interface node that
+    the actuators move, node 7 the one they do not.
+
+    Attributes:
+        storey: storey height [m].
+        bay: bay width [m].
+        E: Young's modulus [Pa].
+        G: shear modulus [Pa].
+        column, interior_ground_column: column sections; the second stands under nodes 4 and 7.
+        beam, interior_ground_beam: beam sections; the second spans from node 4 to node 7.
+        pin_offset: rigid length between the moment release of the column under node 7 and that
+            node [m].
+        storey_mass: (3,) mass of each floor's horizontal translation [kg].
+        vertical_mass: [line][floor] lumped vertical mass of each node [kg].
+    """
+
+    storey: float = 0.635
+    bay: float = 0.762
+    E: float = 29000 * KSI
+    G: float = 29000 * KSI / 2.6
+    column: Section = W5X16
+    interior_ground_column: Section = S3X5_7
+    beam: Section = BU_2
+    interior_ground_beam: Section = BU_1
+    pin_offset: float = 0.028575
+    storey_mass: tuple[float, ...] = (7680.902917, 11496.007637, 11465.716956)
+    vertical_mass: tuple[tuple[float, ...], ...] = field(
+        default=(
+            (1921.049719, 1921.049719, 1913.477049),
+            (1919.401739, 3826.954099, 3819.381429),
+            (1919.401739, 3826.954099, 3819.381429),
+            (1921.049719, 1921.049719, 1913.477049),
+        )
+    )
