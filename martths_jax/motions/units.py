@@ -24,11 +24,19 @@ _SPELLINGS = {
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
 
+def _plain(text: str) -> str:
+    return re.sub(r"[\s^*{}]", "", str(text)).lower().replace("²", "2").replace("−", "-")
+
+
+def is_unit(text: str) -> bool:
+    """Whether `parse_unit` knows the unit."""
+    return _plain(text) in _SPELLINGS
+
+
 def parse_unit(text: str, where: str = "Argument `units`") -> str:
     """The canonical name (a key of `TO_SI`) of a unit of acceleration, however it is spelt."""
-    plain = re.sub(r"[\s^*{}]", "", str(text)).lower().replace("²", "2").replace("−", "-")
-    if plain in _SPELLINGS:
-        return _SPELLINGS[plain]
+    if is_unit(text):
+        return _SPELLINGS[_plain(text)]
     known = ", ".join(TO_SI)
     raise InputError(f"{where} names the unknown unit {str(text)!r:.60}; known units are {known}.")
 

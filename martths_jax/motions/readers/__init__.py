@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from pathlib import Path
 
-from ...errors import InputError
+import numpy as np
+
+from ...errors import InputError, argument_error
 from ..checks import file_bytes, finite_values
 from ..record import Record
 from ..units import TO_SI, parse_unit
 from .contents import Contents
 from .matlab import read_matlab
+from .peer import read_at2
+from .table import read_table
 
 #: File name endings that are taken for a ground motion, and who reads them.
-READERS = {".mat": read_matlab}
+READERS = {
+    ".mat": read_matlab,
+    ".at2": read_at2,
+    ".csv": read_table,
+    ".txt": read_table,
+    ".dat": read_table,
+}
 
 
 def read_record(
@@ -49,14 +60,20 @@ def read_record(
         raise InputError(
             f"{found.where} has no time column and no time step; give the time step (--dt 0.005)."
         )
+    if dt is not None and not (math.isfinite(dt) and dt > 0):
+        raise argument_error("dt", "be a positive time step [s] (--dt)", repr(dt))
     if found.dt is not None and dt is not None and abs(found.dt / dt - 1) > 1e-3:
         raise InputError(
             f"{found.where} has the time step {found.dt:.6g} s, but --dt says {dt:.6g} s; "
             "leave --dt out."
         )
+    with np.errstate(over="ignore"):
+        acceleration = values * TO_SI[unit]
+    if not np.all(np.isfinite(acceleration)):
+        raise InputError(f"{found.where} overflows in m/s^2; check its numbers and its unit.")
     return Record(
         name=name or path.stem,
-        acceleration=values * TO_SI[unit],
+        acceleration=acceleration,
         dt=float(step),
         source=str(path),
         sha256=hashlib.sha256(content).hexdigest(),
