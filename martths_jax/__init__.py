@@ -1,11 +1,11 @@
 """martths_jax: fast, differentiable virtual multi-axial real-time hybrid simulation on JAX.
 
-    from martths_jax import ADFC, build_benchmark, draw_plants, indices, load_motion, simulate
+from martths_jax import ADFC, build_benchmark, draw_plants, indices, load_motion, simulate
 
-    benchmark = build_benchmark()
-    motion = load_motion("elcentro-like", scale=0.4, fs=1024)
-    result = simulate(benchmark, ADFC(), draw_plants(1000, seed=1), motion)
-    print(indices(result)["J2_1"].mean())
+benchmark = build_benchmark()
+motion = load_motion("elcentro-like", scale=0.4, fs=1024)
+result = simulate(benchmark, ADFC(), draw_plants(1000, seed=1), motion)
+print(indices(result)["J2_1"].mean())
 """
 
 from martths_jax import runtime  # first: float64 and the devices are set before JAX starts

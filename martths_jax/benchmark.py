@@ -14,10 +14,10 @@ from martths_jax.plant import NOMINAL_HZ, continuous_modes, nominal_plant
 from martths_jax.sensors import SensorNoise
 from martths_jax.structure.experimental import (
     Quirks,
+    benchmark_partition,
     consistent_partition,
     ideal_frame,
     measured_frame,
-    benchmark_partition,
     restoring_maps,
 )
 from martths_jax.structure.frame import FrameGeometry, build_reference

@@ -53,40 +53,54 @@ class IndexSums:
     fs: float = field(metadata={"static": True})
 
 
-def pairs(signals: Mapping[str, jax.Array], reference: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Values and targets (10, T) of the ``PAIRS`` at one sample.
+def pairs(signals: Mapping[str, jax.Array], reference: jax.Array):
+    """(value, target) of the ``PAIRS`` at one sample, in four groups of 2, 2, 2 and 4 rows.
 
     Args:
         signals: ``x_a``, ``x_m`` (2, T) [mm], ``num`` (6, T), ``est`` (2, T) [m, rad].
         reference: (6, 1) response of the reference structure in the order of ``num``.
     """
     num, est = signals["num"], signals["est"]
-    reference = jnp.broadcast_to(reference, num.shape)
-    value = jnp.concatenate([signals["x_m"], est, est, num[2:]])
-    target = jnp.concatenate([signals["x_a"], num[:2], reference])
-    return value, target
+    return (
+        (signals["x_m"], signals["x_a"]),
+        (est, num[:2]),
+        (est, jnp.broadcast_to(reference[:2], est.shape)),
+        (num[2:], jnp.broadcast_to(reference[2:], num[2:].shape)),
+    )
+
+
+def blank_sums(trials: int):
+    """Zero (error square, target square, error peak, target peak) of the groups of ``pairs``."""
+    return tuple((jnp.zeros((rows, trials)),) * 4 for rows in (2, 2, 2, 4))
 
 
 def correlate(y: jax.Array, x: jax.Array, lags: tuple[int, int]) -> jax.Array:
     """Products sum_k y(k) x(k - l) for l = -lead ... lag.
 
     Args:
-        y: (n, ..., T) samples w ... w + n - 1.
-        x: (n + lead + lag, ..., T) samples w - lag ... w + n - 1 + lead.
+        y: (n, T) samples w ... w + n - 1.
+        x: (n + lead + lag, T) samples w - lag ... w + n - 1 + lead.
         lags: (lead, lag) [samples].
 
     Returns:
-        (lead + lag + 1, ..., T).
+        (lead + lag + 1, T).
     """
-    lead, lag = lags
-    n = y.shape[0]
-    if lead + lag < 64:
-        return jnp.stack([jnp.sum(y * x[lag - l : lag - l + n], 0) for l in range(-lead, lag + 1)])
+    width, n = sum(lags) + 1, y.shape[0]
+    # Blocks of a few samples, each one fused sum over its samples for all lags at once, so that
+    # the accumulator is read and written once a block and the signals stay in the cache.
+    block = 16
+    blocks = -(-n // block)
+    short = [(0, blocks * block - n), (0, 0)]
+    y, x = jnp.pad(y, short), jnp.pad(x, short)
 
-    def one(l):
-        return jnp.sum(y * jax.lax.dynamic_slice_in_dim(x, lag - l, n), 0)
+    def add(total, b):
+        y_b = jax.lax.dynamic_slice_in_dim(y, b * block, block)
+        x_b = jax.lax.dynamic_slice_in_dim(x, b * block, block + width - 1)
+        # Row j of the total is lag `lag - j`.
+        return total + sum(y_b[i] * x_b[i : i + width] for i in range(block)), None
 
-    return jax.lax.map(one, jnp.arange(-lead, lag + 1))
+    total, _ = jax.lax.scan(add, jnp.zeros((width, y.shape[1])), jnp.arange(blocks))
+    return total[::-1]
 
 
 def delay_ms(sums: IndexSums, interpolate: bool) -> jax.Array:

@@ -18,7 +18,7 @@ import numpy as np
 from scipy import linalg
 
 from martths_jax.errors import argument_error
-from martths_jax.structure.modal import ModalSystem, advance, output, to_dense
+from martths_jax.structure.modal import ModalSystem, advance, output, spread, to_dense
 
 
 @jax.tree_util.register_dataclass
@@ -41,8 +41,7 @@ class KalmanFilter:
     def correct(self, predicted: jax.Array, measured_mm: jax.Array) -> tuple[jax.Array, jax.Array]:
         """Corrected state (2, m, T) and estimated strokes (2, T) [mm]."""
         innovation = measured_mm - output(self.model, predicted)
-        gain = self.filter_gain if self.filter_gain.ndim == 4 else self.filter_gain[..., None]
-        state = predicted + jnp.sum(gain * innovation, axis=2)
+        state = predicted + spread(self.filter_gain, innovation)
         return state, output(self.model, state)
 
     def predict(self, state: jax.Array, command_mm: jax.Array) -> jax.Array:

@@ -1,7 +1,7 @@
 """One sample period, and the one scan over time that repeats it.
 
-Everything here is pure: what stays (benchmark, controller, plants) and what moves (``LoopState``) are
-pytrees, trials stand on the last axis.  ``sample_period`` read from top to bottom is the physics.
+Everything here is pure: what stays (benchmark, controller, plants) and what moves (``LoopState``)
+are pytrees, trials stand on the last axis.  ``sample_period`` read from top to bottom is the physics.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from martths_jax import watch as watching
 from martths_jax.benchmark import Benchmark
 from martths_jax.controllers import Controller, Observation
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
-from martths_jax.indices import IndexSums, correlate, pairs
+from martths_jax.indices import IndexSums, blank_sums, correlate, pairs
 from martths_jax.structure.modal import ModalSystem, advance, contract, output
 
 #: Length of the time loop's windows for controllers that keep none [samples].
@@ -165,8 +165,11 @@ def run(
         valid = k < N
         sums = _accumulate(sums, signals, reference_k[:, None], valid)
         watch = watching.update(watch, k, valid, signals)
-        strokes = jnp.stack([signals[name] for name in ("x_a", "x_m", "x_hat")])
-        strokes = jnp.where(valid, strokes, 0.0)
+        strokes = tuple(
+            jnp.where(valid, signals[name][i], 0.0)
+            for name in ("x_a", "x_m", "x_hat")
+            for i in range(2)
+        )
         kept = {name: x[..., :keep] for name, x in signals.items()} if keep else {}
         return (state, sums, watch), (strokes, record, kept)
 
@@ -176,16 +179,17 @@ def run(
         state, sums, watch = moving
         state = replace(state, controller=controller.turn(state.controller))
         added, tail = _correlate_window(tail, strokes, lags)
-        return ((state, sums, watch), records, tail, correlation + added), signals
+        correlation = jax.tree.map(jnp.add, correlation, added)
+        return ((state, sums, watch), records, tail, correlation), signals
 
     blank = controller.blank_record(trials)
     records = jax.tree.map(lambda x: jnp.zeros((length, *x.shape), x.dtype), blank)
     state = initial_state(benchmark, controller, plant, trials)
     carry = (
-        (state, (jnp.zeros((10, trials)),) * 4, watching.init(trials)),
+        (state, blank_sums(trials), watching.init(trials)),
         records,
-        jnp.zeros((sum(lags), 3, 2, trials)),
-        jnp.zeros((sum(lags) + 1, 2, 2, trials)),
+        (jnp.zeros((sum(lags), trials)),) * 6,
+        (jnp.zeros((sum(lags) + 1, trials)),) * 4,
     )
     samples = jnp.arange(windows * length).reshape(windows, length)
     inputs = (samples, *map(in_windows, (ground, reference, noise)))
@@ -193,11 +197,12 @@ def run(
 
     (_, sums, watch), _, tail, correlation = carry
     # The last `lead` samples still wait for targets that come after them: none do.
-    correlation += _correlate_window(tail, jnp.zeros((lags[0], *tail.shape[1:])), lags)[0]
+    nothing = (jnp.zeros((lags[0], trials)),) * 6
+    correlation = jax.tree.map(jnp.add, correlation, _correlate_window(tail, nothing, lags)[0])
     signals = jax.tree.map(lambda x: x.reshape(windows * length, *x.shape[2:])[:N], signals)
     index_sums = IndexSums(
-        *sums,
-        correlation=correlation.reshape(-1, 4, trials),
+        *(jnp.concatenate(group) for group in zip(*sums, strict=True)),
+        correlation=jnp.stack(correlation, axis=1),
         lags=lags,
         fs=benchmark.fs,
     )
@@ -206,15 +211,19 @@ def run(
 
 def _accumulate(sums, signals, reference, valid):
     """Running sums of squares and peaks of the ten pairs, see ``IndexSums``."""
-    value, target = pairs(signals, reference)
-    error = jnp.where(valid, value - target, 0.0)
-    target = jnp.where(valid, target, 0.0)
-    error_square, target_square, error_peak, target_peak = sums
-    return (
-        error_square + error**2,
-        target_square + target**2,
-        jnp.maximum(error_peak, jnp.abs(error)),
-        jnp.maximum(target_peak, jnp.abs(target)),
+
+    def one(so_far, value, target):
+        error = jnp.where(valid, value - target, 0.0)
+        target = jnp.where(valid, target, 0.0)
+        return (
+            so_far[0] + error * error,
+            so_far[1] + target * target,
+            jnp.maximum(so_far[2], jnp.abs(error)),
+            jnp.maximum(so_far[3], jnp.abs(target)),
+        )
+
+    return tuple(
+        one(so_far, *pair) for so_far, pair in zip(sums, pairs(signals, reference), strict=True)
     )
 
 
@@ -222,14 +231,16 @@ def _correlate_window(tail, strokes, lags):
     """Cross-correlations that a window adds, and the tail that the next one needs.
 
     Args:
-        tail: (lead + lag, 3, 2, T) the last strokes of the windows before.
-        strokes: (n, 3, 2, T) targets, measured and estimated strokes of this window.
+        tail: the last lead + lag samples of the windows before, like `strokes`.
+        strokes: both targets, measured and estimated strokes of this window, six arrays (n, T).
         lags: (lead, lag).
 
     Returns:
-        (lead + lag + 1, 2, 2, T) correlations of (measured, estimated) x actuator; the new tail.
+        (lead + lag + 1, T) correlations in the order of ``DELAYS``; the new tail.
     """
-    n, both = strokes.shape[0], jnp.concatenate([tail, strokes])
-    y = both[lags[1] : lags[1] + n, 1:]
-    x = both[:, :1]
-    return correlate(y, x, lags), both[n:]
+    n = strokes[0].shape[0]
+    joined = [jnp.concatenate(pair) for pair in zip(tail, strokes, strict=True)]
+    added = tuple(
+        correlate(joined[i][lags[1] : lags[1] + n], joined[i % 2], lags) for i in range(2, 6)
+    )
+    return added, tuple(x[n:] for x in joined)

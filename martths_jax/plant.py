@@ -280,16 +280,12 @@ def discretise_parameters(parameters_hz: jax.Array, dt: float) -> ModalSystem:
     frame_input = jnp.stack([push_frame.real, push_frame.imag])
     column = [jnp.stack([push[j], frame_input], 1) for j in range(2)]  # (2, 2 slots, T)
     none = jnp.zeros((2, 2, T))
-    B = jnp.stack(
-        [jnp.concatenate([column[0], none], 1), jnp.concatenate([none, column[1]], 1)], 2
-    )
+    B = jnp.stack([jnp.concatenate([column[0], none], 1), jnp.concatenate([none, column[1]], 1)], 2)
     rows = []
     for i in range(2):
         slots = []
         for j in range(2):
             slots.append(real_residue[i, j])
-            slots.append(
-                jnp.stack([2 * frame_residue[i, j].real, -2 * frame_residue[i, j].imag])
-            )
+            slots.append(jnp.stack([2 * frame_residue[i, j].real, -2 * frame_residue[i, j].imag]))
         rows.append(jnp.stack(slots, 1))
     return ModalSystem(a=a, b=b, B=B, C=jnp.stack(rows))

@@ -16,7 +16,7 @@ def _backend_is_up() -> bool:
 
 #: Back-end options that make the simulation loop about 1.7 times faster on CPUs with AVX-512 and
 #: do not change its results; unknown ones are ignored by XLA, so an older JAX still starts.
-XLA_EXTRA_OPTIONS = "xla_cpu_use_multi_output_fusion,xla_cpu_prefer_vector_width=512"
+XLA_EXTRA_OPTIONS = "xla_cpu_use_multi_output_fusion --xla_cpu_prefer_vector_width=512"
 
 
 def usable_cores() -> int:

@@ -27,7 +27,7 @@ from martths_jax.watch import Status
 #: Trials a device runs side by side: enough for wide vectors, few enough to stay in its cache.
 LANES = 128
 #: Ranges of the cross-correlations [samples at 1024 Hz], tried in turn until the peak is inside.
-LAG_RANGES = ((16, 16), (32, 96), (256, 512))
+LAG_RANGES = ((6, 13), (32, 96), (256, 512))
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def simulate(
     Raises:
         InputError: naming every argument that cannot be used.
 
-    Inside ``jax.grad`` or another transformation the whole batch runs as one block and stays traced.
+    Inside ``jax.grad`` or another transformation the batch runs as one block and stays traced.
     """
     controller, per_trial = prepare(controller, benchmark, len(plants))
     noise = SensorNoise() if noise is None else noise
@@ -145,9 +145,7 @@ class Setup:
     reference: jax.Array
 
 
-def prepare(
-    controller, benchmark: Benchmark, trials: int
-) -> tuple[Controller, tuple[bool, ...]]:
+def prepare(controller, benchmark: Benchmark, trials: int) -> tuple[Controller, tuple[bool, ...]]:
     """Controller ready to run, and which of its leaves differ from trial to trial.
 
     A sequence of controllers, one a trial, becomes one controller whose differing leaves are

@@ -13,7 +13,7 @@ from martths_jax.benchmark import VOLT_LIMIT, command_volts
 #: A command or stroke beyond this is a loop that has run away: the largest stroke in the study is
 #: about a tenth of it, and the coupler has no position for strokes 254 mm apart.
 RUNAWAY_MM = 100.0
-NEVER = jnp.iinfo(jnp.int32).max
+NEVER = float(2**53)
 
 
 class Status(IntEnum):
@@ -25,70 +25,63 @@ class Status(IntEnum):
     NONFINITE = 3
 
 
-#: Signals that are watched, in the order in which they are checked.
-WATCHED = ("command", "stroke", "interface")
-
-
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Watch:
     """First samples at which something happened, ``NEVER`` where it did not; T trials.
 
     Attributes:
-        saturated: (2, T) first sample at which each valve asks for more than its limit.
-        runaway: (3, T) first sample at which each of ``WATCHED`` left its range.
-        nonfinite: (T,) first sample at which any of them was not finite.
+        saturated: (2, T) each valve asks for more than its limit.
+        command: (2, T) a command left its range or is not a number.
+        stroke: (2, T) a measured stroke left its range or is not a number.
+        nonfinite: (2, T) a measured stroke is not finite.
         volt_peak: (2, T) largest valve command [V].
     """
 
     saturated: jax.Array
-    runaway: jax.Array
+    command: jax.Array
+    stroke: jax.Array
     nonfinite: jax.Array
     volt_peak: jax.Array
 
 
 def init(trials: int) -> Watch:
     """Nothing has happened yet."""
-    never = jnp.full((trials,), NEVER, dtype=jnp.int32)
-    return Watch(
-        saturated=jnp.stack([never] * 2),
-        runaway=jnp.stack([never] * len(WATCHED)),
-        nonfinite=never,
-        volt_peak=jnp.zeros((2, trials)),
-    )
+    never = jnp.full((2, trials), NEVER)
+    return Watch(never, never, never, never, jnp.zeros((2, trials)))
 
 
 def update(watch: Watch, k: jax.Array, valid: jax.Array, signals: dict[str, jax.Array]) -> Watch:
     """Look at sample k.
 
     Args:
-        valid: whether sample k belongs to the record.
-        signals: ``u``, ``x_m`` (2, T) [mm] and ``est`` (2, T) [m, rad].
+        k: number of the sample.
+        valid: whether it belongs to the record.
+        signals: ``u`` and ``x_m`` (2, T) [mm].
     """
     volts = jnp.abs(command_volts(signals["u"]))
-    magnitude = jnp.stack(
-        [
-            jnp.max(jnp.abs(signals["u"]), axis=0),
-            jnp.max(jnp.abs(signals["x_m"]), axis=0),
-            jnp.max(jnp.abs(signals["est"]), axis=0) * 1e3,
-        ]
-    )
-    finite = jnp.all(jnp.isfinite(magnitude), axis=0)
+    now = jnp.where(valid, k.astype(float), NEVER)
 
-    def first(so_far, happened):
-        return jnp.where(happened & valid, jnp.minimum(so_far, k.astype(jnp.int32)), so_far)
+    def first(so_far, good):
+        return jnp.minimum(so_far, jnp.where(good, NEVER, now))
 
     return Watch(
-        saturated=first(watch.saturated, volts > VOLT_LIMIT),
-        runaway=first(watch.runaway, magnitude > jnp.array([[1.0], [1.0], [10.0]]) * RUNAWAY_MM),
-        nonfinite=first(watch.nonfinite, ~finite),
+        saturated=first(watch.saturated, ~(volts > VOLT_LIMIT)),
+        # NaN compares false, so it counts as out of range.
+        command=first(watch.command, jnp.abs(signals["u"]) <= RUNAWAY_MM),
+        stroke=first(watch.stroke, jnp.abs(signals["x_m"]) <= RUNAWAY_MM),
+        nonfinite=first(watch.nonfinite, jnp.isfinite(signals["x_m"])),
         volt_peak=jnp.where(valid, jnp.maximum(watch.volt_peak, volts), watch.volt_peak),
     )
 
 
 def status_of(watch: Watch) -> jax.Array:
     """(T,) ``Status`` of each trial."""
-    happened = lambda first: first != NEVER  # noqa: E731
-    status = jnp.where(jnp.any(happened(watch.saturated), axis=0), Status.SATURATED, Status.OK)
-    status = jnp.where(happened(watch.nonfinite), Status.NONFINITE, status)
-    return jnp.where(jnp.any(happened(watch.runaway), axis=0), Status.DIVERGED, status)
+    happened = lambda first: jnp.any(jnp.asarray(first) != NEVER, axis=0)  # noqa: E731
+    runaway = happened(watch.command) | happened(watch.stroke)
+    # A trial that ran away overflows in the end; only one that is lost at once is "nonfinite".
+    first_bad = jnp.minimum(jnp.min(watch.command, axis=0), jnp.min(watch.stroke, axis=0))
+    at_once = happened(watch.nonfinite) & (jnp.min(watch.nonfinite, axis=0) <= first_bad)
+    status = jnp.where(happened(watch.saturated), Status.SATURATED, Status.OK)
+    status = jnp.where(runaway, Status.DIVERGED, status)
+    return jnp.where(at_once, Status.NONFINITE, status)

@@ -15,8 +15,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from martths_jax.controllers import least_squares as ls
 from martths_jax.controllers.base import Controller, Decision
-from martths_jax.controllers.least_squares import SOLVERS, outer_packed
 from martths_jax.errors import InputError, argument_error
 from martths_jax.kalman import design_kalman
 
@@ -88,7 +88,7 @@ class ADFC(Controller):
         expect(np.all(np.isfinite(pull) & (pull >= 0)), "pull", "be zero or positive (mm^2)", pull)
         q = np.asarray(self.q)
         expect(np.all(np.isfinite(q) & (q > 0)), "q", "be positive (mm^2)", q)
-        expect(self.solver in SOLVERS, "solver", f"be one of {sorted(SOLVERS)}", self.solver)
+        expect(self.solver in ls.SOLVERS, "solver", f"be one of {sorted(ls.SOLVERS)}", self.solver)
         if self.start is not None:
             shape = np.shape(self.start)
             expect(shape[:2] == (8, 2) and len(shape) in (2, 3), "start", "be (8, 2)", shape)
@@ -104,42 +104,53 @@ class ADFC(Controller):
             self,
             no=jnp.asarray(self.no),
             pull=jnp.asarray(self.pull, dtype=float),
-            start=start if start.ndim == 3 else start[..., None],
+            start=start,
             estimator=design_kalman(benchmark.plant_model, self.q, benchmark.r_mm2),
         )
 
     def init(self, trials):
-        packed = tuple(jnp.zeros((8 - j, trials)) for j in range(8))
-        taps = jnp.zeros((TAPS, 2, trials))
+        zero = jnp.zeros(trials)
+        taps = ((zero,) * (TAPS - 1),) * 2
         return {
-            "coefficients": jnp.broadcast_to(self.start, (8, 2, trials)),
-            # Normal equations: rows of the window before, not yet left, and rows of this window.
-            "old": (packed, jnp.zeros((8, 2, trials))),
-            "new": (packed, jnp.zeros((8, 2, trials))),
-            # Last five samples of the estimate, of the estimate N_b samples ago, of the target.
+            "coefficients": tuple(
+                tuple(jnp.broadcast_to(c, (trials,)) for c in row) for row in self.start
+            ),
+            # Normal equations of the rows of the last window that are still in the buffer, and of
+            # the rows of this window.
+            "old": ls.zeros(8, 2, trials),
+            "new": ls.zeros(8, 2, trials),
+            # Four samples before this one of both estimates, of the estimates N_b samples ago, and
+            # of both targets.
             "estimate": taps,
             "leaving": taps,
             "target": taps,
-            "command": jnp.zeros((2, trials)),
+            "command": (zero, zero),
         }
 
     def blank_record(self, trials):
-        return jnp.zeros((2, trials)), jnp.zeros((2, trials))
+        return jnp.zeros((4, trials))
 
     def step(self, state, seen):
-        leaving_estimate, leaving_command = seen.delayed
-        estimate = push(state["estimate"], seen.estimate_mm)
-        leaving = push(state["leaving"], leaving_estimate)
-        target = push(state["target"], seen.target_mm)
+        left = seen.delayed
+        estimate, phi = regress(state["estimate"], seen.estimate_mm)
+        leaving, phi_leaving = regress(state["leaving"], left[:2])
+        target, phi_target = regress(state["target"], seen.target_mm)
 
         # u(k-1) is the last command that the estimate at k can have felt.
         applied = state["command"]
-        new = add(state["new"], products(regressor(estimate), applied))
-        old = subtract(state["old"], products(regressor(leaving), leaving_command))
-        rows, hop = seen.k + 1, self.nb - self.no
-        due = (rows >= self.nb) & ((rows - self.nb) % hop == 0)
-        coefficients = jnp.where(due, self.fit(add(old, new)), state["coefficients"])
-        command = jnp.sum(coefficients * regressor(target)[:, None], axis=0)
+        new = ls.add_observation(state["new"], phi, applied)
+        old = ls.add_observation(state["old"], phi_leaving, left[2:], sign=-1.0)
+        # The first fit waits until no row in the buffer reaches back before the first sample.
+        since_full, hop = seen.k - (self.nb + TAPS - 1), self.nb - self.no
+        due = (since_full >= 0) & (since_full % hop == 0)
+        fitted = ls.SOLVERS[self.solver](ls.pulled(ls.add(old, new), self.pull, self.start))
+        coefficients = tuple(
+            tuple(jnp.where(due, a, b) for a, b in zip(*rows, strict=True))
+            for rows in zip(fitted, state["coefficients"], strict=True)
+        )
+        command = tuple(
+            sum(c[i] * p for c, p in zip(coefficients, phi_target, strict=True)) for i in range(2)
+        )
         state = {
             "coefficients": coefficients,
             "old": old,
@@ -149,7 +160,12 @@ class ADFC(Controller):
             "target": target,
             "command": command,
         }
-        return state, Decision(command, (seen.estimate_mm, applied), {"C_A": coefficients})
+        decision = Decision(
+            command_mm=jnp.stack(command),
+            record=jnp.concatenate([seen.estimate_mm, jnp.stack(applied)]),
+            signals={"C_A": jnp.stack([jnp.stack(row) for row in coefficients])},
+        )
+        return state, decision
 
     def turn(self, state):
         """Start a new window: the fresh sum of its rows replaces the sliding difference.
@@ -159,35 +175,22 @@ class ADFC(Controller):
         """
         return state | {"old": state["new"], "new": jax.tree.map(jnp.zeros_like, state["new"])}
 
-    def fit(self, normal):
-        """C_A from the normal equations, pulled towards the start (8, 2, T)."""
-        packed, rhs = normal
-        packed = tuple(jnp.concatenate([c[:1] + self.pull, c[1:]]) for c in packed)
-        return SOLVERS[self.solver](packed, rhs + self.pull * self.start)
 
+def regress(before, newest: jax.Array):
+    """Regressor phi = [C_D x_1, C_D x_2] and the samples to remember for the next one.
 
-def push(taps: jax.Array, newest: jax.Array) -> jax.Array:
-    """Shift the newest sample (2, T) into (5, 2, T) taps."""
-    return jnp.concatenate([newest[None], taps[:-1]])
+    Args:
+        before: for each actuator, its last four samples (T,), newest first.
+        newest: (2, T) this sample.
 
-
-def regressor(taps: jax.Array) -> jax.Array:
-    """phi = [C_D x_1, C_D x_2] (8, T) of (5, 2, T) taps."""
-    rows = [sum(c * taps[i] for i, c in enumerate(row) if c) for row in BACKWARD_DIFFERENCES]
-    phi = jnp.stack(rows, axis=1)  # (2 actuators, 4 derivatives, T)
-    return phi.reshape(8, -1)
-
-
-def products(phi: jax.Array, command: jax.Array):
-    """What one row adds to the normal equations: phi phi' (packed) and phi u'."""
-    return outer_packed(phi), phi[:, None] * command
-
-
-def add(a, b):
-    """Sum of two pairs (normal matrix, right side)."""
-    return jax.tree.map(jnp.add, a, b)
-
-
-def subtract(a, b):
-    """Difference of two pairs (normal matrix, right side)."""
-    return jax.tree.map(jnp.subtract, a, b)
+    Returns:
+        for each actuator, its four newest samples; phi as eight arrays (T,).
+    """
+    phi, kept = [], []
+    for actuator in range(2):
+        taps = (newest[actuator], *before[actuator])
+        phi += [
+            sum(c * x for c, x in zip(row, taps, strict=True) if c) for row in BACKWARD_DIFFERENCES
+        ]
+        kept.append(taps[:-1])
+    return tuple(kept), phi

@@ -1,67 +1,99 @@
-"""Small symmetric systems solved for a whole batch of trials at once.
+"""Normal equations of a small least-squares problem, for a whole batch of trials at once.
 
-Symmetric 8 x 8 matrices are held packed: a list of columns, column j with rows j ... n-1 of shape
-(n - j, T).  The unrolled factorisation then is a few dozen wide vector operations, where a batched
-LAPACK call would be one small call a trial.
+The code below is scalar algebra in which each "number" is an array over trials (T,).  The
+symmetric matrix G = sum phi phi' and the right side h = sum phi u' are held as packed rows: row j is
+the tuple (G[j, j], ..., G[j, n-1], h[j, 0], ..., h[j, r-1]).  Compilers turn this into long vector
+kernels without index arithmetic; two-dimensional rows and (n, n, T) arrays are slower on CPUs, and
+a batched LAPACK call, which is one small call a trial, is far slower.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import jax
 import jax.numpy as jnp
 
-Packed = tuple[jax.Array, ...]
+Rows = tuple[tuple[jax.Array, ...], ...]
 
 
-def outer_packed(x: jax.Array) -> Packed:
-    """Lower triangle of x x' as packed columns; x is (n, T)."""
-    return tuple(x[j:] * x[j] for j in range(x.shape[0]))
+def zeros(unknowns: int, sides: int, trials: int) -> Rows:
+    """Empty normal equations."""
+    zero = jnp.zeros(trials)
+    return tuple((zero,) * (unknowns - j + sides) for j in range(unknowns))
 
 
-def unpack(columns: Packed) -> jax.Array:
-    """(n, n, T) full symmetric matrix of packed columns."""
-    n, T = len(columns), columns[0].shape[-1]
-    full = jnp.zeros((n, n, T))
-    for j, column in enumerate(columns):
-        full = full.at[j:, j].set(column)
-        full = full.at[j, j:].set(column)
-    return full
-
-
-def solve_ldl(columns: Packed, rhs: jax.Array) -> jax.Array:
-    """Solve G c = h by the square-root-free Cholesky factorisation G = L D L', unrolled.
+def add_observation(
+    rows: Rows, phi: Sequence[jax.Array], values: Sequence[jax.Array], sign: float = 1.0
+) -> Rows:
+    """Add (sign 1) or take away (sign -1) one observation phi' c = values.
 
     Args:
-        columns: packed symmetric positive definite G, n columns.
-        rhs: (n, r, T) right-hand sides.
+        phi: n regressors (T,).
+        values: r observed values (T,).
+    """
+    both = [*phi, *values]
+    return tuple(
+        tuple(g + sign * (phi[j] * v) for g, v in zip(row, both[j:], strict=True))
+        for j, row in enumerate(rows)
+    )
+
+
+def add(a: Rows, b: Rows) -> Rows:
+    """Sum of two sets of normal equations."""
+    return jax.tree.map(jnp.add, a, b)
+
+
+def pulled(rows: Rows, weight, towards: jax.Array) -> Rows:
+    """Add weight |c - towards|^2 to the least-squares problem.
+
+    Args:
+        weight: scalar or (T,), same unit as G.
+        towards: (n, r) or (n, r, T).
+    """
+    n = len(rows)
+    return tuple(
+        (row[0] + weight, *row[1 : n - j])
+        + tuple(h + weight * towards[j, i] for i, h in enumerate(row[n - j :]))
+        for j, row in enumerate(rows)
+    )
+
+
+def full_matrices(rows: Rows) -> tuple[jax.Array, jax.Array]:
+    """Full G (n, n, T) and h (n, r, T)."""
+    n = len(rows)
+    G = jnp.stack([jnp.stack([rows[min(i, j)][abs(i - j)] for j in range(n)]) for i in range(n)])
+    return G, jnp.stack([jnp.stack(row[n - j :]) for j, row in enumerate(rows)])
+
+
+def solve_ldl(rows: Rows) -> list[list[jax.Array]]:
+    """Solve G c = h by square-root-free Cholesky factorisation, unrolled.
 
     Returns:
-        (n, r, T) solutions; not finite for a trial whose G is singular.
+        c[j][side] (T,); not finite for a trial whose G is singular.
     """
-    n = len(columns)
-    work = list(columns)
-    pivots, factors = [], []
-    x = list(rhs)
+    n = len(rows)
+    work = [list(row) for row in rows]
     for j in range(n):
         inverse = 1.0 / work[j][0]
-        below = work[j][1:]
-        factor = below * inverse
+        scaled = [value * inverse for value in work[j]]
         for i in range(j + 1, n):
-            work[i] = work[i] - factor[i - j - 1 :] * below[i - j - 1]
-            x[i] = x[i] - factor[i - j - 1] * x[j]
-        pivots.append(inverse)
-        factors.append(factor)
-    x = [x[j] * pivots[j] for j in range(n)]
+            for m in range(len(work[i])):
+                work[i][m] = work[i][m] - scaled[i - j] * work[j][i - j + m]
+        work[j] = scaled
+    solution: list[list[jax.Array]] = [[]] * n
     for j in reversed(range(n)):
+        value = work[j][n - j :]
         for i in range(j + 1, n):
-            x[j] = x[j] - factors[j][i - j - 1] * x[i]
-    return jnp.stack(x)
+            value = [v - work[j][i - j] * c for v, c in zip(value, solution[i], strict=True)]
+        solution[j] = value
+    return solution
 
 
-def solve_lu(columns: Packed, rhs: jax.Array) -> jax.Array:
+def solve_lu(rows: Rows) -> list[list[jax.Array]]:
     """The same by ``jnp.linalg.solve`` (LU with partial pivoting): the reference, far slower."""
-    G = jnp.moveaxis(unpack(columns), -1, 0)
-    return jnp.moveaxis(jnp.linalg.solve(G, jnp.moveaxis(rhs, -1, 0)), 0, -1)
+    G, h = (jnp.moveaxis(x, -1, 0) for x in full_matrices(rows))
+    return [list(c) for c in jnp.moveaxis(jnp.linalg.solve(G, h), 0, -1)]
 
 
 SOLVERS = {"ldl": solve_ldl, "lu": solve_lu}

@@ -30,7 +30,9 @@ class Passthrough(Controller):
     def prepare(self, benchmark):
         if self.q is None:
             return replace(self, estimator=DirectMeasurement())
-        return replace(self, estimator=design_kalman(benchmark.plant_model, self.q, benchmark.r_mm2))
+        return replace(
+            self, estimator=design_kalman(benchmark.plant_model, self.q, benchmark.r_mm2)
+        )
 
     def init(self, trials):
         return ()

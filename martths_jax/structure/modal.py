@@ -51,15 +51,25 @@ def contract(matrix: jax.Array, x: jax.Array, axes: int = 1) -> jax.Array:
         x: (*n, T).
         axes: number of axes that are summed.
     """
+    flat = x.reshape(-1, x.shape[-1])
     if matrix.ndim == axes + 1:
-        matrix = matrix[..., None]
-    return jnp.sum(matrix * x, axis=tuple(range(1, axes + 1)))
+        return matrix.reshape(matrix.shape[0], -1) @ flat
+    matrix = matrix.reshape(matrix.shape[0], -1, matrix.shape[-1])
+    # Written as a chain, since XLA turns a sum over a short axis into slow scalar code on CPUs.
+    return sum(matrix[:, i] * flat[i] for i in range(flat.shape[0]))
+
+
+def spread(matrix: jax.Array, u: jax.Array) -> jax.Array:
+    """B u for B (2, m, i), shared or (2, m, i, T), and u (i, T) -> (2, m, T)."""
+    if matrix.ndim == 3:
+        product = matrix.reshape(-1, matrix.shape[-1]) @ u
+        return product.reshape(*matrix.shape[:2], -1)
+    return sum(matrix[:, :, i] * u[i] for i in range(u.shape[0]))
 
 
 def advance(system: ModalSystem, x: jax.Array, u: jax.Array) -> jax.Array:
     """State after one step: x (2, m, T), inputs u (i, T) -> (2, m, T)."""
-    B = system.B if system.B.ndim == 4 else system.B[..., None]
-    return system.a * x + system.b * x[::-1] + jnp.sum(B * u, axis=2)
+    return system.a * x + system.b * x[::-1] + spread(system.B, u)
 
 
 def output(system: ModalSystem, x: jax.Array, u: jax.Array | None = None) -> jax.Array:
