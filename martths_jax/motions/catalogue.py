@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from ..errors import InputError
+from .builtin import BUILTIN_NAMES
 from .readers import READERS
 
 #: Environment variable that stands in for ``--records``.
@@ -85,8 +86,6 @@ def _not_found(asked: str, path: Path, available: dict, matches: list, records) 
     asked = repr(asked[:200])
     if matches:
         return f"Motion {asked} could be {', '.join(p.name for p in matches)}; give the file name."
-    from .builtin import BUILTIN_NAMES
-
     choices = ", ".join([*BUILTIN_NAMES, *available])
     looked = records_folder(records)
     hint = f"the folder of records is {looked}" if looked else "no folder of records is set"

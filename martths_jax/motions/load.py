@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError, argument_error
+from .builtin import BUILTIN_NAMES, builtin_record
 from .catalogue import find_file, short_name
 from .checks import check_memory
 from .measures import spectral_acceleration
@@ -34,6 +35,8 @@ def load_record(
     variable: str | None = None,
 ) -> Record:
     """The unscaled record behind a name or path, at its own time step (see `load_motion`)."""
+    if os.fspath(path_or_name) in BUILTIN_NAMES:
+        return builtin_record(os.fspath(path_or_name))
     path = find_file(os.fspath(path_or_name), records)
     return read_record(path, name=short_name(path), units=units, dt=dt, variable=variable)
 

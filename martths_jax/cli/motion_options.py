@@ -1,0 +1,77 @@
+"""The options that say which ground motions a command runs on, the same for every command.
+
+    def run(motion: Motions = DEFAULT, records: Records = None, scale: Scale = None, ...):
+        for one in load_all(motion, records, scale, pga, sa, units, resample, fs): ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from martths_jax.motions import DEFAULT_SCALE, Motion, load_motion
+
+Motions = Annotated[
+    list[str],
+    typer.Option(
+        "--motion",
+        help="Built-in motion (elcentro-like, kobe-like, morganhill-like), name under --records, "
+        "or path of a .mat, .AT2 or .csv file; may be repeated.",
+    ),
+]
+Records = Annotated[
+    Path | None,
+    typer.Option(
+        "--records",
+        metavar="DIR",
+        help="Folder of ground motions, found by name [default: $MARTHS_RECORDS].",
+    ),
+]
+Scale = Annotated[
+    float | None,
+    typer.Option("--scale", help=f"Factor on the unscaled record [default: {DEFAULT_SCALE}]."),
+]
+Pga = Annotated[
+    str | None, typer.Option("--pga", help="Scale to this PGA instead, such as 0.4g or 3.9m/s2.")
+]
+Sa = Annotated[
+    str | None,
+    typer.Option("--sa", help="Scale to this 5 %-damped Sa instead, such as 0.3g@2.29Hz."),
+]
+Units = Annotated[
+    str | None,
+    typer.Option("--units", help="Unit of files that do not say theirs: g, m/s2 or cm/s2."),
+]
+Resample = Annotated[
+    str,
+    typer.Option("--resample", help="linear (the benchmark's) or bandlimited."),
+]
+
+
+def load_all(
+    motions: Sequence[str],
+    records: Path | None = None,
+    scale: float | None = None,
+    pga: str | None = None,
+    sa: str | None = None,
+    units: str | None = None,
+    resample: str = "linear",
+    fs: float = 1024,
+) -> list[Motion]:
+    """Every motion of a command, from the values of its options."""
+    return [
+        load_motion(
+            motion,
+            scale=DEFAULT_SCALE if scale is None else scale,
+            fs=fs,
+            records=records,
+            units=units,
+            pga=pga,
+            sa=sa,
+            resample=resample,
+        )
+        for motion in motions
+    ]

@@ -1,0 +1,97 @@
+"""``martths motions``: list, show and make ground motions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress
+from rich.table import Table
+
+from martths_jax.cli.motion_options import Records, Units
+from martths_jax.motions import MotionInfo, available_motions, load_record, write_ensemble
+from martths_jax.motions.figure import draw_motion
+from martths_jax.motions.overview import FIRST_MODE
+from martths_jax.motions.units import G
+
+app = typer.Typer(help="List, show and make ground motions.")
+console = Console()
+
+COLUMNS = (
+    ("dt [s]", lambda i: f"{i.dt:.4g}"),
+    ("length [s]", lambda i: f"{i.duration:.2f}"),
+    ("PGA [g]", lambda i: f"{i.measures['PGA'] / G:.3f}"),
+    ("PGV [m/s]", lambda i: f"{i.measures['PGV']:.3f}"),
+    ("Arias [m/s]", lambda i: f"{i.measures['Arias']:.3f}"),
+    ("CAV [m/s]", lambda i: f"{i.measures['CAV']:.2f}"),
+    ("D5-95 [s]", lambda i: f"{i.measures['D5-95']:.2f}"),
+    (f"Sa({FIRST_MODE:.2f} Hz) [g]", lambda i: f"{i.measures['Sa'] / G:.3f}"),
+)
+
+
+@app.callback(invoke_without_command=True)
+def motions(context: typer.Context, records: Records = None, units: Units = None) -> None:
+    """List the motions there are, unscaled, with their intensity measures."""
+    if context.invoked_subcommand is None:
+        console.print(_table(available_motions(records, units)))
+
+
+def _table(found: list[MotionInfo]) -> Table:
+    table = Table(title="Ground motions, unscaled; 5 % damping")
+    table.add_column("name", overflow="fold")
+    for title, _ in COLUMNS:
+        table.add_column(title, justify="right")
+    table.add_column("from", overflow="fold")
+    for info in found:
+        if info.problem:
+            cells = ["?"] * len(COLUMNS)
+        else:
+            cells = [text(info) for _, text in COLUMNS]
+        table.add_row(escape(info.name), *cells, escape(info.problem or info.source))
+    return table
+
+
+@app.command()
+def show(
+    name: Annotated[str, typer.Argument(help="Name or path of a motion.")],
+    out: Annotated[Path, typer.Option("--out", help="Picture to write: .png, .pdf or .svg.")],
+    records: Records = None,
+    units: Units = None,
+) -> None:
+    """Draw a motion's acceleration, Arias build-up and response spectrum."""
+    draw_motion(load_record(name, records=records, units=units), out)
+    console.print(f"Wrote {escape(str(out))}", soft_wrap=True)
+
+
+@app.command()
+def make(
+    like: Annotated[
+        str, typer.Option("--like", help="Target: elcentro, kobe, morganhill, or any motion.")
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write into.")],
+    count: Annotated[int, typer.Option("--count", help="Number of motions.")] = 10,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the ensemble.")] = 0,
+    records: Records = None,
+    units: Units = None,
+) -> None:
+    """Make different motions compatible with one target spectrum, intensity and duration."""
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task("making motions", total=count)
+        lines = write_ensemble(
+            like,
+            count,
+            out,
+            seed=seed,
+            records=records,
+            units=units,
+            progress=lambda done, total: bar.update(task, completed=done),
+        )
+    accepted = sum(line["accepted"] for line in lines)
+    console.print(
+        f"Wrote {len(lines)} motions to {escape(str(out))}; {accepted} of them are within the "
+        "limits on spectrum, PGA, Arias intensity and D5-95 (see ensemble.json).",
+        soft_wrap=True,
+    )

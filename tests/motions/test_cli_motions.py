@@ -1,0 +1,78 @@
+"""``martths motions`` and the motion options of other commands."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from martths_jax.cli import motion_options as options
+from martths_jax.cli.motions import app
+from martths_jax.errors import InputError
+
+runner = CliRunner()
+
+
+@pytest.fixture(autouse=True)
+def wide_terminal_and_own_cache(tmp_path_factory, monkeypatch):
+    monkeypatch.setenv("MARTHS_CACHE", str(tmp_path_factory.getbasetemp() / "cache"))
+    monkeypatch.delenv("MARTHS_RECORDS", raising=False)
+    monkeypatch.setattr("martths_jax.cli.motions.console.width", 200)
+
+
+def test_list(tmp_path):
+    (tmp_path / "mine.csv").write_text("0,0\n0.01,1\n0.02,0\n")
+    result = runner.invoke(app, ["--records", str(tmp_path), "--units", "g"])
+    assert result.exit_code == 0, result.output
+    for word in ("elcentro-like", "kobe-like", "morganhill-like", "mine", "built-in", "D5-95"):
+        assert word in result.output
+
+
+def test_show(tmp_path):
+    out = tmp_path / "fig.png"
+    result = runner.invoke(app, ["show", "elcentro-like", "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    assert out.read_bytes().startswith(b"\x89PNG")
+    result = runner.invoke(app, ["show", "elcentro-like", "--out", str(tmp_path / "fig.xyz")])
+    assert isinstance(result.exception, InputError)
+    assert "fig.xyz" in str(result.exception)
+
+
+def test_make(tmp_path):
+    arguments = ["make", "--like", "elcentro", "--count", "1", "--seed", "3"]
+    result = runner.invoke(app, [*arguments, "--out", str(tmp_path / "made")])
+    assert result.exit_code == 0, result.output
+    assert sorted(p.name for p in (tmp_path / "made").iterdir()) == [
+        "elcentro-like-s3-001.csv",
+        "ensemble.json",
+    ]
+
+
+def test_options_of_other_commands():
+    command = typer.Typer()
+    got = []
+
+    @command.command()
+    def run(
+        motion: options.Motions,
+        records: options.Records = None,
+        scale: options.Scale = None,
+        pga: options.Pga = None,
+        sa: options.Sa = None,
+        units: options.Units = None,
+        resample: options.Resample = "linear",
+    ):
+        got.extend(options.load_all(motion, records, scale, pga, sa, units, resample))
+
+    result = runner.invoke(command, ["--motion", "elcentro-like", "--pga", "0.2g"])
+    assert result.exit_code == 0, result.output
+    assert np.abs(got[0].acceleration).max() == pytest.approx(0.2 * 9.80665, rel=0.03)
+    result = runner.invoke(command, ["--motion", "elcentro-like", "--scale", "1", "--sa", "1g@2Hz"])
+    assert isinstance(result.exception, InputError)
+
+
+def test_importing_motions_leaves_matplotlib_alone():
+    code = "import sys, martths_jax.motions as m; assert 'matplotlib' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
