@@ -1,0 +1,51 @@
+"""The command line ``martths``.  Each group of commands has its own file; this one joins them."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from martths_jax import __version__
+from martths_jax.cli import motions, nominal
+from martths_jax.cli.console import error_console
+from martths_jax.errors import InputError
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    help="Virtual multi-axial real-time hybrid simulation (v-maRTHS): single runs, studies, tables.",
+)
+app.command("modes")(nominal.modes)
+app.command("run")(nominal.run)
+app.command("table4")(nominal.table4)
+app.add_typer(motions.app, name="motions")
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"martths {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the command line: user errors are one message and exit code 2, Ctrl-C is 130."""
+    try:
+        app()
+    except InputError as error:
+        error_console.print(f"[bold red]Error:[/] {error}", highlight=False, soft_wrap=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        error_console.print("Interrupted; no half-written file was left.")
+        sys.exit(130)

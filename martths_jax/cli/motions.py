@@ -43,7 +43,7 @@ def _table(found: list[MotionInfo]) -> Table:
     table = Table(title="Ground motions, unscaled; 5 % damping")
     table.add_column("name", overflow="fold")
     for title, _ in COLUMNS:
-        table.add_column(title, justify="right")
+        table.add_column(escape(title), justify="right")
     table.add_column("from", overflow="fold")
     for info in found:
         if info.problem:

@@ -1,0 +1,114 @@
+"""Runs of the nominal plant, and how they compare with the published tables."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from martths_jax import published
+from martths_jax.benchmark import Benchmark
+from martths_jax.controllers import ADFC, LQG, Controller
+from martths_jax.indices import NAMES, indices
+from martths_jax.motions import Motion
+from martths_jax.plant import nominal_plant
+from martths_jax.sensors import SensorNoise
+from martths_jax.simulation import simulate
+
+COLUMNS = {"lqg": published.LQG, "adfc": published.ADFC}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Indices of the nominal plant beside Table 4.
+
+    Attributes:
+        motions: names of the motions that were averaged.
+        ours: controller -> index -> mean over the motions.
+        each: controller -> motion -> index -> value.
+    """
+
+    motions: tuple[str, ...]
+    ours: dict[str, dict[str, float]]
+    each: dict[str, dict[str, dict[str, float]]]
+
+    def rows(self) -> list[dict[str, object]]:
+        """One row an index and controller: ours, published, deviation [%]."""
+        found = []
+        for controller, values in self.ours.items():
+            for name in NAMES:
+                target = published.TABLE4[name][COLUMNS[controller]]
+                value = values[name]
+                found.append(
+                    {
+                        "controller": controller,
+                        "index": name,
+                        "martths_jax": value,
+                        "published": target,
+                        "deviation_percent": 100 * (value / target - 1),
+                    }
+                )
+        return found
+
+    def to_csv(self) -> str:
+        """The rows as CSV."""
+        text = io.StringIO()
+        rows = self.rows()
+        writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        return text.getvalue()
+
+    def to_markdown(self) -> str:
+        """A table like the published one, with deviations."""
+        names = list(self.ours)
+        rows = {(r["controller"], r["index"]): r for r in self.rows()}
+        head = "| index | " + " | ".join(f"{n} | {n} paper | deviation" for n in names) + " |"
+        lines = [head, "|---|" + "---:|" * (3 * len(names))]
+        for index in NAMES:
+            cells = []
+            for name in names:
+                r = rows[name, index]
+                cells += [
+                    f"{r['martths_jax']:.2f}",
+                    f"{r['published']:g}",
+                    f"{r['deviation_percent']:+.1f} %",
+                ]
+            lines.append(f"| {index} | " + " | ".join(cells) + " |")
+        return "\n".join(lines) + "\n"
+
+
+def compare_with_table4(
+    benchmark: Benchmark,
+    motions: Sequence[Motion],
+    controllers: Sequence[Controller] | None = None,
+    noise: SensorNoise | None = None,
+    progress: Callable[[int], None] = lambda done: None,
+) -> Comparison:
+    """Run the nominal plant under each controller and motion and average over the motions.
+
+    Args:
+        benchmark: from ``build_benchmark``.
+        motions: the paper averages El Centro, Kobe and Morgan Hill scaled by 0.40.
+        controllers: LQG and ADFC with their defaults if None.
+        noise: sensor noise; the benchmark's if None.
+        progress: told how many runs are done.
+    """
+    controllers = controllers or [LQG.design(benchmark), ADFC()]
+    each: dict[str, dict[str, dict[str, float]]] = {}
+    done = 0
+    for controller in controllers:
+        for motion in motions:
+            result = simulate(benchmark, controller, nominal_plant(), motion, noise)
+            values = {name: float(v[0]) for name, v in indices(result).items()}
+            each.setdefault(controller.name, {})[motion.name] = values
+            done += 1
+            progress(done)
+    ours = {
+        name: {index: float(np.mean([v[index] for v in runs.values()])) for index in NAMES}
+        for name, runs in each.items()
+    }
+    return Comparison(tuple(m.name for m in motions), ours, each)

@@ -1,0 +1,45 @@
+"""What the literature prints, for comparison only: nothing in the engine reads these numbers.
+
+Table 1: Condori Uribe et al. 2023 (modes of the reference structure).  Table 4: Calayir, Tao &
+Mercan 2025 (means over El Centro, Kobe and Morgan Hill scaled by 0.40, nominal plant).
+"""
+
+from __future__ import annotations
+
+#: Mode -> (natural frequency [Hz], effective mass in x [%]).
+TABLE1 = {
+    1: (2.2913, 81.05),
+    2: (12.7480, 16.60),
+    3: (26.2803, 5e-7),
+    4: (26.5352, 0.009),
+    5: (29.9124, 2.34),
+}
+
+#: Index -> (experiment with LQG, virtual LQG, virtual ADFC); J1 and J4 in ms, the rest in percent.
+TABLE4 = {
+    "J1_1": (-13.7, 2.0, 0.98),
+    "J1_2": (2.9, 2.9, 0.98),
+    "J2_1": (23.8, 4.8, 3.9),
+    "J2_2": (13.2, 9.4, 2.46),
+    "J3_1": (26.9, 5.3, 3.39),
+    "J3_2": (13.7, 10.3, 2.92),
+    "J4_1": (1.9, 1.9, 0.98),
+    "J4_2": (4.9, 2.9, 0.98),
+    "J5_4": (8.1, 6.7, 1.69),
+    "J5_28": (27.8, 17.8, 2.59),
+    "J6_4": (8.2, 7.4, 2.36),
+    "J6_28": (28.6, 18.8, 3.88),
+    "J7_4": (12.2, 10.6, 9.18),
+    "J7_28": (26.2, 16.8, 7.13),
+    "J8_2": (12.5, 1.8, 6.81),
+    "J8_26": (12.7, 3.4, 6.15),
+    "J8_3": (12.4, 2.1, 6.46),
+    "J8_27": (12.5, 3.0, 6.2),
+    "J9_4": (13.2, 11.9, 8.61),
+    "J9_28": (27.3, 18.1, 7.02),
+    "J10_2": (13.4, 2.7, 5.23),
+    "J10_26": (13.4, 2.7, 4.59),
+    "J10_3": (12.8, 1.8, 4.77),
+    "J10_27": (13.2, 2.4, 4.61),
+}
+EXPERIMENT, LQG, ADFC = range(3)
