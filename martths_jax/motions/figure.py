@@ -34,7 +34,7 @@ def draw_motion(record: Record, path: str | os.PathLike) -> None:
     for axis in axes.values():
         axis.grid(alpha=0.3)
     try:
-        figure.savefig(path, dpi=150)
+        figure.savefig(path, dpi=150, bbox_inches="tight")
     except (OSError, ValueError) as error:
         raise InputError(f"Picture {path} cannot be written: {error}.") from None
 

@@ -20,7 +20,7 @@ from ..measures import (
     significant_duration,
 )
 from ..record import Record
-from ..spectra import response_spectrum
+from ..spectra import oscillators, response_spectrum
 
 FACTS_FILE = Path(__file__).with_name("facts.json")
 
@@ -39,10 +39,13 @@ FRACTIONS = np.array(
     [1e-6, 1e-5, 1e-4, 1e-3, 0.005, 0.02, *(round(0.05 * i, 2) for i in range(1, 20)), 0.98, 0.995]
 )
 
-#: Fractions of a band's energy at which its build-up is kept (17).
+#: Fractions of a band's energy at which its build-up is kept (17).  Those below `ONSET` are told by
+#: the velocity of a 25 %-damped oscillator, which cannot answer before the ground has moved; the
+#: zero-phase filters of the others can, and would tell nothing of the first faint movement.
 BAND_FRACTIONS = np.array(
     [1e-5, 1e-4, 1e-3, 5e-3, 0.02, 0.05, *(round(0.1 * i, 1) for i in range(1, 10)), 0.95, 0.98]
 )
+ONSET, ONSET_DAMPING = 0.05, 0.25
 
 #: Energy by frequency: bands 10 % apart.  Energy by time: bands 30 % apart, short in time.
 LOWEST, HIGHEST = 0.15, 45.0
@@ -149,8 +152,17 @@ def measure(record: Record) -> Facts:
             f"its facts need at least {SHORTEST:g} s and a step of at most {COARSEST:g} s."
         )
     moving = np.flatnonzero(acceleration)
-    parts = time_bands(acceleration.size, dt).split(acceleration)
-    buildup = np.cumsum(parts**2, axis=1) * dt
+    bands = time_bands(acceleration.size, dt)
+    buildup = np.cumsum(bands.split(acceleration) ** 2, axis=1) * dt
+    first = oscillators(1 / bands.frequencies, ONSET_DAMPING, dt)
+    onset = np.cumsum([one.run(acceleration, "velocity") ** 2 for one in first], axis=1)
+    late = BAND_FRACTIONS >= ONSET
+    band_times = np.column_stack(
+        [
+            [crossing_times(energy, dt, BAND_FRACTIONS[~late]) for energy in onset],
+            [crossing_times(energy, dt, BAND_FRACTIONS[late]) for energy in buildup],
+        ]
+    )
     return Facts(
         dt=dt,
         samples=acceleration.size,
@@ -165,7 +177,7 @@ def measure(record: Record) -> Facts:
         husid_times=crossing_times(husid(acceleration, dt), dt, FRACTIONS),
         line_energy=energies(acceleration, dt, line_bands(acceleration.size, dt)),
         band_energy=buildup[:, -1],
-        band_times=np.stack([crossing_times(energy, dt, BAND_FRACTIONS) for energy in buildup]),
+        band_times=band_times,
     )
 
 

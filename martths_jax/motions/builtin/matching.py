@@ -59,7 +59,8 @@ def match(start: np.ndarray, facts: Facts, first: int = 6, then: int = 24) -> np
 
     `first` steps fit the energies, which are smooth, and `then` steps everything.
     """
-    spread = active_window(facts) * (
+    # Squared: the first faint movement is left nearly as `start` has it.
+    spread = active_window(facts) ** 2 * (
         _PRIOR_ENVELOPE * envelope(facts) + _PRIOR_PGA * facts.pga
     )
     energies = _energy_targets(facts)

@@ -33,7 +33,7 @@ def intensity(times: np.ndarray, fractions: np.ndarray, facts: Facts) -> np.ndar
     A monotone curve through the points, from 0 at the end of the lead to 1 at the start of the
     tail; constant where the facts leave no room between two points.
     """
-    # Zero-phase bands respond a little before the ground moves: such points say nothing.
+    # Points at the very first sample, and points that coincide, say nothing.
     told = times > facts.lead + facts.dt
     knots, levels = np.maximum.accumulate(times[told]), fractions[told]
     told = np.diff(knots, prepend=facts.lead) > 1e-6
@@ -87,7 +87,7 @@ def random_start(facts: Facts, seed: int | tuple[int, ...]) -> np.ndarray:
     narrow, wide = line_bands(facts.samples, facts.dt), time_bands(facts.samples, facts.dt)
     lines = _even(narrow.split(noise))
     rates = [
-        gaussian_filter1d(intensity(times, BAND_FRACTIONS, facts), 0.2 / (f * facts.dt))
+        _smooth(intensity(times, BAND_FRACTIONS, facts), 0.2 / (f * facts.dt))
         for f, times in zip(wide.frequencies, facts.band_times, strict=True)
     ]
     distance = np.abs(np.log(narrow.frequencies[:, None] / wide.frequencies))
@@ -97,6 +97,11 @@ def random_start(facts: Facts, seed: int | tuple[int, ...]) -> np.ndarray:
     for _ in range(ROUNDS):
         level *= np.sqrt(facts.line_energy / energies(level @ lines, facts.dt, narrow))
     return level @ lines
+
+
+def _smooth(rate: np.ndarray, width: float) -> np.ndarray:
+    """(n,) smoothed rate; in its logarithm, so that strong motion does not spread into faint."""
+    return np.exp(gaussian_filter1d(np.log(np.maximum(rate, 1e-9 * rate.max())), width))
 
 
 def _even(lines: np.ndarray) -> np.ndarray:
