@@ -31,9 +31,11 @@ def check_simulation(benchmark, controller, plants, motion, noise) -> None:
             False, "plants", "be a batch of plants", type(plants).__name__,
             "Use draw_plants(n, seed) or plant_from_draws(draws).",
         )  # fmt: skip
-    elif expect(len(plants) > 0, "plants", "hold at least one trial", "none"):
-        problems += noise_problems(noise, len(plants), np.size(motion.acceleration))
+    else:
+        expect(len(plants) > 0, "plants", "hold at least one trial", "none")
     problems += motion_problems(motion, benchmark.fs)
+    if not problems:
+        problems += noise_problems(noise, len(plants), np.size(motion.acceleration))
     problems += controller.problems(benchmark)
     raise_all(problems, "The simulation cannot run")
 

@@ -79,15 +79,20 @@ class ADFC(Controller):
             if not good:
                 found.append(str(argument_error(name, wanted, got)))
 
-        nb, no = self.nb, np.asarray(self.no)
+        def known(value):
+            # A traced value has none yet; it is the caller's to keep in range.
+            return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
+
+        nb, no, pull, q = self.nb, known(self.no), known(self.pull), known(self.q)
         whole = isinstance(nb, (int, np.integer))
         expect(whole and nb >= 9, "nb", "be a whole number of at least 9 (8 unknowns)", nb)
-        if whole:
+        if whole and no is not None:
             expect(np.all((no >= 0) & (no <= nb - 1)), "no", f"lie in [0, nb - 1 = {nb - 1}]", no)
-        pull = np.asarray(self.pull)
-        expect(np.all(np.isfinite(pull) & (pull >= 0)), "pull", "be zero or positive (mm^2)", pull)
-        q = np.asarray(self.q)
-        expect(np.all(np.isfinite(q) & (q > 0)), "q", "be positive (mm^2)", q)
+        if pull is not None:
+            good = np.all(np.isfinite(pull) & (pull >= 0))
+            expect(good, "pull", "be zero or positive (mm^2)", pull)
+        if q is not None:
+            expect(np.all(np.isfinite(q) & (q > 0)), "q", "be positive (mm^2)", q)
         expect(self.solver in ls.SOLVERS, "solver", f"be one of {sorted(ls.SOLVERS)}", self.solver)
         if self.start is not None:
             shape = np.shape(self.start)
