@@ -34,7 +34,6 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", default=RECORDS, help="records to search for")
     chosen = parser.parse_args()
     judge = Judge()
-    kept = json.loads(FACTS_FILE.read_text(encoding="utf-8"))
     for name in chosen.only:
         real = judge(load_record(name, records=chosen.records))
         best = np.inf
@@ -43,10 +42,16 @@ def main() -> None:
             note(row)
             if row["departure"] < best:
                 best = row["departure"]
-                kept["seeds"][name] = seed
+                keep_seed(name, seed)
             if best <= chosen.good:
                 break
-        write(kept["seeds"], kept["records"])
+
+
+def keep_seed(name: str, seed: int) -> None:
+    """Store the seed in the package's data file."""
+    stored = json.loads(FACTS_FILE.read_text(encoding="utf-8"))
+    stored["seeds"][name] = seed
+    write(stored["seeds"], stored["records"])
 
 
 def try_seed(name: str, seed: int, judge: Judge, real: np.ndarray) -> dict:
