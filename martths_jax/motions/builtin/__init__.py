@@ -40,8 +40,8 @@ BUILTIN_NAMES = {
     "morganhill-like": "morganhill",
 }
 
-#: Decimals of a made motion [m/s^2]: far below any meaning, far above rounding, so that samples
-#: and checksum are the same on every machine.
+#: Decimals of a made motion [m/s^2]: far below any meaning and far above rounding, so that samples
+#: and checksum hardly ever differ between machines.
 DECIMALS = 6
 
 #: Trials an ensemble may need for one member before it gives up.
