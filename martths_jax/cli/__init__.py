@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from martths_jax import __version__
-from martths_jax.cli import motions, nominal
+from martths_jax.cli import motions, nominal, study
 from martths_jax.cli.console import error_console
 from martths_jax.errors import InputError
 
@@ -20,6 +20,11 @@ app = typer.Typer(
 app.command("modes")(nominal.modes)
 app.command("run")(nominal.run)
 app.command("table4")(nominal.table4)
+app.command("study")(study.study)
+app.command("init-config")(study.init_config)
+app.command("merge")(study.merge)
+app.command("summary")(study.summary)
+app.command("export")(study.export)
 app.add_typer(motions.app, name="motions")
 
 

@@ -1,0 +1,241 @@
+"""``martths study``, ``init-config``, ``merge``, ``summary`` and ``export``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import jax
+import typer
+from rich.markup import escape
+
+from martths_jax.cli.console import console, error_console
+from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
+from martths_jax.errors import InputError, argument_error
+from martths_jax.study import Bars, Lines, Reporter, Study, merge_runs, open_study, run_study
+from martths_jax.study.config import make_config, read_toml
+from martths_jax.study.distributed import join
+from martths_jax.study.export import export_plants, write_csv, write_mat
+from martths_jax.study.provenance import command_line
+from martths_jax.study.template import write_template
+
+Folder = Annotated[Path, typer.Argument(help="Folder of a study.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")]
+Keep = Annotated[
+    str | None,
+    typer.Option("--keep", metavar="1,617", help="Trials whose signals are stored too."),
+]
+
+
+def study(
+    config: Annotated[
+        Path | None, typer.Option("--config", help="TOML file, see init-config; flags override it.")
+    ] = None,
+    trials: Annotated[int | None, typer.Option("--trials", help="Uncertain plants [1000].")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed of all draws [1].")] = None,
+    controllers: Annotated[
+        list[str] | None,
+        typer.Option("--controller", help="lqg, adfc, passthrough; may be repeated [lqg, adfc]."),
+    ] = None,
+    motions: Motions = None,
+    records: Records = None,
+    scale: Scale = None,
+    pga: Pga = None,
+    sa: Sa = None,
+    units: Units = None,
+    resample: Resample = None,
+    draws: Annotated[
+        str | None, typer.Option("--draws", help="independent, lhs or sobol [independent].")
+    ] = None,
+    plants: Annotated[
+        Path | None, typer.Option("--plants", help="CSV with the nine parameters of each plant.")
+    ] = None,
+    plants_as: Annotated[
+        str | None, typer.Option("--plants-as", help="What its numbers are: hz, rad/s or draws.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder of the results [study].")
+    ] = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Start over: delete the study in the folder.")
+    ] = False,
+    keep: Keep = None,
+    signals: Annotated[
+        bool | None, typer.Option("--signals/--no-signals", help="Store chosen trials' signals.")
+    ] = None,
+    devices: Annotated[
+        int | None, typer.Option("--devices", help="Devices to use [all: one a core].")
+    ] = None,
+    memory_gb: Annotated[
+        float | None, typer.Option("--memory", help="Bound on a chunk's memory [GB].")
+    ] = None,
+    max_failed: Annotated[
+        int | None, typer.Option("--max-failed", help="More diverged runs than this: exit code 1.")
+    ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option("--shard", metavar="I/N", help="Run the I-th of N shares; merge them after."),
+    ] = None,
+    distributed: Annotated[
+        bool, typer.Option("--distributed", help="Join the cluster's other processes of this job.")
+    ] = False,
+    coordinator: Annotated[
+        str | None, typer.Option("--coordinator", help="host:port of process 0.")
+    ] = None,
+    num_processes: Annotated[
+        int | None, typer.Option("--num-processes", help="How many processes there are.")
+    ] = None,
+    process_id: Annotated[
+        int | None, typer.Option("--process-id", help="Which of them this is, from 0.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run controllers x motions x uncertain plants; resumes and extends what is in the folder."""
+    given = {
+        "trials": trials, "seed": seed, "controllers": controllers or None, "motions":
+        motions or None, "records": records, "scale": scale, "pga": pga, "sa": sa, "units": units,
+        "resample": resample, "draws": draws, "plants": plants, "plants_as": plants_as,
+        "out": out, "keep": trial_list(keep), "signals": signals, "devices": devices,
+        "memory_gb": memory_gb, "max_failed": max_failed,
+    }  # fmt: skip
+    settings = {} if config is None else read_toml(config)
+    chosen = make_config(settings | {k: v for k, v in given.items() if v is not None})
+    if chosen.devices is not None:
+        _set_devices(chosen.devices)
+    share = _share(shard)
+    together = distributed or any(x is not None for x in (coordinator, num_processes, process_id))
+    if together:
+        if share is not None:
+            raise InputError(
+                "Options --shard and --coordinator or --distributed exclude each other."
+            )
+        share = join(coordinator, num_processes, process_id)
+    try:
+        done = run_study(
+            chosen,
+            reporter=_reporter(quiet),
+            fresh=fresh,
+            share=share,
+            together=together,
+            command_line=command_line(),
+        )
+    except KeyboardInterrupt:
+        error_console.print(
+            f"What is finished is kept in {chosen.out}; repeat the command to go on.",
+            highlight=False, soft_wrap=True, markup=False,
+        )  # fmt: skip
+        raise
+    if done is not None:
+        _show(done, quiet, chosen.max_failed)
+    elif not together and not quiet:
+        console.print(
+            f"Share {shard} is done; when all are: martths merge {escape(chosen.out)}",
+            highlight=False, soft_wrap=True,
+        )  # fmt: skip
+
+
+def init_config(
+    path: Annotated[Path, typer.Argument(help="File to write.")] = Path("study.toml"),
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
+) -> None:
+    """Write a commented configuration with all defaults."""
+    write_template(path, force)
+    console.print(f"Wrote {escape(str(path))}", soft_wrap=True)
+
+
+def merge(
+    out: Annotated[Path, typer.Argument(help="Folder of the whole study.")],
+    folders: Annotated[
+        list[Path] | None, typer.Argument(help="Folders with shares, if not all are in OUT.")
+    ] = None,
+    records: Records = None,
+    signals: Annotated[bool, typer.Option("--signals/--no-signals")] = True,
+    keep: Keep = None,
+    quiet: Quiet = False,
+) -> None:
+    """Join the shares that --shard ran into one study."""
+    done = merge_runs(
+        out,
+        folders or (),
+        records=None if records is None else str(records),
+        signals=signals,
+        keep=trial_list(keep) or (),
+        reporter=_reporter(quiet),
+    )
+    _show(done, quiet)
+
+
+def summary(folder: Folder) -> None:
+    """Show the summary of a finished study."""
+    _show(open_study(folder), quiet=False)
+
+
+def export(
+    folder: Folder,
+    mat: Annotated[Path | None, typer.Option("--mat", help="MATLAB file to write.")] = None,
+    csv: Annotated[Path | None, typer.Option("--csv", help="Tidy CSV file to write.")] = None,
+    plants: Annotated[
+        Path | None, typer.Option("--plants", help="CSV file for the plants' parameters.")
+    ] = None,
+) -> None:
+    """Write a finished study's results or plants for other tools."""
+    asked = [(mat, write_mat), (csv, write_csv), (plants, export_plants)]
+    if not any(path for path, _ in asked):
+        raise InputError("Say what to export: --mat FILE, --csv FILE or --plants FILE.")
+    dataset = open_study(folder).dataset
+    for path, write in asked:
+        if path is not None:
+            write(dataset, path)
+            console.print(f"Wrote {escape(str(path))}", soft_wrap=True)
+
+
+def trial_list(text: str | None) -> list[int] | None:
+    """Trial numbers of ``--keep 1,617``.
+
+    Raises:
+        InputError: if it is not such a list.
+    """
+    if text is None:
+        return None
+    if not re.fullmatch(r"\s*\d+\s*(,\s*\d+\s*)*", text):
+        raise argument_error("keep", "be trial numbers such as 1,617", repr(text))
+    return [int(word) for word in text.split(",")]
+
+
+def _share(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    match = re.fullmatch(r"(\d+)/(\d+)", text)
+    if not match or not 1 <= int(match[1]) <= int(match[2]):
+        raise argument_error("shard", "be I/N with 1 <= I <= N, such as 3/16", repr(text))
+    return int(match[1]), int(match[2])
+
+
+def _set_devices(count: int) -> None:
+    try:
+        jax.config.update("jax_num_cpu_devices", count)
+    except RuntimeError:  # JAX runs already (a program that calls this command)
+        pass
+
+
+def _reporter(quiet: bool) -> Reporter:
+    if quiet:
+        return Reporter()
+    return Bars(error_console) if error_console.is_terminal else Lines(error_console)
+
+
+def _show(done: Study, quiet: bool, max_failed: int | None = None) -> None:
+    if not quiet:
+        found = done.summary()
+        console.print(f"[bold]{escape(found.heading)}")
+        for table in found.tables:
+            console.print(table)
+        console.print(f"Results are in {escape(str(done.folder))}: study.nc, study.csv, summary.md",
+                      highlight=False, soft_wrap=True)  # fmt: skip
+    if max_failed is not None and done.failed > max_failed:
+        error_console.print(
+            f"{done.failed} runs diverged, more than --max-failed {max_failed} allows.",
+            highlight=False, soft_wrap=True,
+        )  # fmt: skip
+        raise typer.Exit(1)

@@ -1,0 +1,210 @@
+"""The one place where a study touches the simulation's inside: chunks of trials through the loop.
+
+``simulate`` would do, but it draws the noise anew in every call; here the noise of a chunk is drawn
+once and serves every motion and controller.  The numbers are the same to the last bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.sharding import Mesh
+from jax.sharding import PartitionSpec as P
+
+from martths_jax.errors import InputError
+from martths_jax.indices import NAMES, indices
+from martths_jax.sensors import unit_noise
+from martths_jax.simulation import (
+    LANES,
+    Result,
+    Setup,
+    fill,
+    prepare,
+    reference_response,
+    run_block,
+)
+from martths_jax.study.plan import Plan
+from martths_jax.watch import NEVER
+
+#: First samples that a ``Watch`` holds, by the name they have in the results.
+FIRSTS = ("saturated", "command", "stroke", "nonfinite")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a chunk of T trials gave under one controller and motion.
+
+    Attributes:
+        value: (T, 24) indices, NaN where the trial diverged.
+        status: (T,) ``Status``.
+        first: (T, 4, 2) first samples at which ``FIRSTS`` happened, NaN for never; by actuator.
+        volt_peak: (T, 2) largest valve commands [V].
+    """
+
+    value: np.ndarray
+    status: np.ndarray
+    first: np.ndarray
+    volt_peak: np.ndarray
+
+    def __getitem__(self, which) -> Outcome:
+        return Outcome(*(x[which] for x in self.arrays().values()))
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The arrays by name."""
+        return dict(vars(self))
+
+    @classmethod
+    def join(cls, parts: list[Outcome]) -> Outcome:
+        """Trials after trials."""
+        columns = zip(*(p.arrays().values() for p in parts), strict=True)
+        return cls(*(np.concatenate(x) for x in columns))
+
+
+def choose_devices(wanted: int | None) -> list:
+    """Devices of this process to run on.
+
+    Raises:
+        InputError: if there are fewer than `wanted`.
+    """
+    local = jax.local_devices()
+    if wanted is not None and wanted > len(local):
+        raise InputError(
+            f"Argument `devices` must be at most {len(local)}, the devices JAX started with, but "
+            f"got {wanted}; set MARTHS_DEVICES={wanted} before Python starts."
+        )
+    return local[:wanted]
+
+
+class Engine:
+    """Runs chunks of a plan's trials on some devices.
+
+    Args:
+        plan: what to run.
+        devices: of this process.
+        chunk: trials that share one drawing of noise, a multiple of a block.
+    """
+
+    def __init__(self, plan: Plan, devices: list, chunk: int):
+        self.plan, self.devices, self.chunk = plan, devices, chunk
+        self.setups: dict[tuple[str, str], Setup] = {}
+        self.longest = max(m.acceleration.size for m in plan.motions)
+        self._noise: dict[bytes, list] = {}
+
+    @property
+    def block(self) -> int:
+        """Trials that run side by side."""
+        return LANES * len(self.devices)
+
+    def setup(self, controller: str, motion: str) -> Setup:
+        """What all blocks of a controller and motion share; built when first asked for."""
+        key = controller, motion
+        if key not in self.setups:
+            chosen = next(m for m in self.plan.motions if m.name == motion)
+            ready, own = prepare(self.plan.controllers[controller], self.plan.benchmark, 1)
+            same = next((s for (_, m), s in self.setups.items() if m == motion), None)
+            ground = same.ground if same else jnp.asarray(chosen.acceleration)
+            response = same.reference if same else reference_response(self.plan.benchmark, ground)
+            self.setups[key] = Setup(self.plan.benchmark, ready, own, ground, response)
+        return self.setups[key]
+
+    def noise(self, trial: np.ndarray) -> list[jax.Array]:
+        """Noise of a chunk, block by block, for the longest motion; forgets the chunk before."""
+        key = trial.tobytes()
+        if key not in self._noise:
+            self._noise = {}  # free the old chunk's memory before drawing
+            self._noise[key] = self._drawn(trial, self.devices)
+        return self._noise[key]
+
+    def _drawn(self, trial: np.ndarray, devices: list) -> list:
+        size = LANES * len(devices)
+        positions = np.arange(trial.size)
+        noise, draw = self.plan.noise, _noise_program(tuple(devices), self.longest)
+        return [
+            draw(
+                trial[fill(positions[i : i + size], size)],
+                noise.seed,
+                noise.power * self.plan.benchmark.fs,
+                channels=noise.channels,
+            )
+            for i in range(0, trial.size, size)
+        ]
+
+    def run(self, controller: str, motion: str, trial: np.ndarray) -> Outcome:
+        """Run the trials (T,) of a chunk."""
+        setup = self.setup(controller, motion)
+        samples = setup.ground.shape[0]
+        plants = self.plan.draws.plants(trial)
+        blocks = []
+        for i, noise in enumerate(self.noise(trial)):
+            which = np.arange(i * self.block, min((i + 1) * self.block, trial.size))
+            sums, watch, _ = run_block(
+                setup, plants, _cut(noise, samples), which, self.devices, keep=False
+            )
+            blocks.append(self._outcome(setup, sums, watch, trial[which]))
+        return Outcome.join(blocks)
+
+    def signals(self, controller: str, motion: str, trial: np.ndarray, device) -> dict:
+        """Signals (T, N, ...) of at most ``LANES`` trials, run again on one device."""
+        setup = self.setup(controller, motion)
+        noise = self._drawn(trial, [device])[0]
+        _, _, signals = run_block(
+            setup,
+            self.plan.draws.plants(trial),
+            _cut(noise, setup.ground.shape[0]),
+            np.arange(trial.size),
+            [device],
+            keep=True,
+        )
+        return signals
+
+    def _outcome(self, setup: Setup, sums, watch, trial: np.ndarray) -> Outcome:
+        result = Result(sums, watch, {}, setup.reference, trial, setup.benchmark.fs, "", "")
+        found = indices(result)
+        first = np.stack([np.asarray(getattr(watch, name)) for name in FIRSTS])
+        return Outcome(
+            value=np.stack([found[name] for name in NAMES], axis=-1),
+            status=result.status.astype(np.int32),
+            first=np.moveaxis(np.where(first >= NEVER, np.nan, first), -1, 0),
+            volt_peak=np.asarray(watch.volt_peak).T,
+        )
+
+
+_programs: dict[tuple, object] = {}
+
+
+def _noise_program(devices: tuple, samples: int):
+    """Program that draws the noise of a filled block on its devices, ``LANES`` trials on each.
+
+    The shape on a device never changes, so a trial's noise has the same bits on any of them.
+    """
+    key = devices, samples
+    if key not in _programs:
+        mesh = Mesh(np.array(devices), ("trials",))
+
+        @partial(jax.jit, static_argnames=("channels", "seed"))
+        def draw(trial, seed, variance, channels):
+            local = lambda t: unit_noise(seed, t, samples, channels)  # noqa: E731
+            return jnp.sqrt(variance) * jax.shard_map(
+                local,
+                mesh=mesh,
+                in_specs=P("trials"),
+                out_specs=P(None, None, "trials"),
+                check_vma=False,
+            )(trial)
+
+        _programs[key] = draw
+    return _programs[key]
+
+
+@partial(jax.jit, static_argnums=1)
+def _shortened(noise: jax.Array, samples: int) -> jax.Array:
+    return noise[:samples]
+
+
+def _cut(noise: jax.Array, samples: int) -> jax.Array:
+    """The first samples of the noise: what a shorter motion would have drawn."""
+    return noise if noise.shape[0] == samples else _shortened(noise, samples)

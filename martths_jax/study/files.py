@@ -1,0 +1,63 @@
+"""Files that appear whole or not at all, and disk errors a user can act on."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from martths_jax.errors import InputError
+from martths_jax.files import atomic
+
+_REMEDIES = {
+    errno.ENOSPC: "free some space and repeat the command: what is finished is kept",
+    errno.EDQUOT: "your quota is full; free some space and repeat the command",
+    errno.EFBIG: "the file system or a limit refuses files of this size",
+    errno.EACCES: "give --out a folder you may write to",
+    errno.EPERM: "give --out a folder you may write to",
+    errno.EROFS: "give --out a folder on a disk that can be written to",
+    errno.ENOTDIR: "a part of the path is a file; give --out another folder",
+    errno.EEXIST: "a file stands where the folder should be; give --out another folder",
+}
+
+
+@contextmanager
+def disk_errors(path: Path) -> Iterator[None]:
+    """Turn an ``OSError`` into an ``InputError`` that names the path and says what to do.
+
+    Raises:
+        InputError: whatever the disk refused.
+    """
+    try:
+        yield
+    except OSError as error:
+        # HDF5 wraps the system's error and keeps its number.
+        remedy = _REMEDIES.get(error.errno or 0, "see to it and repeat the command")
+        reason = error.strerror or str(error)
+        raise InputError(f"{path} cannot be written ({reason}); {remedy}.") from error
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[Path]:
+    """``files.atomic``, and the file is on the disk before it takes its name.
+
+    Killed at any moment, or out of power, either the old file stands there or the whole new one.
+    """
+    with atomic(path) as part:
+        yield part
+        with part.open("rb+") as file:
+            os.fsync(file.fileno())
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole (see ``writing``)."""
+    with writing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Delete the temporary files of processes that were killed."""
+    for temporary in folder.rglob(".*.part*"):
+        temporary.unlink(missing_ok=True)

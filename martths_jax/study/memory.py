@@ -1,0 +1,53 @@
+"""How many trials fit: the chunk of a study from the memory that is free."""
+
+from __future__ import annotations
+
+import psutil
+
+from martths_jax.errors import InputError
+
+GB = 1e9
+#: Most blocks in a chunk: more would save no time and lose more work when a run is killed.
+MOST_BLOCKS = 16
+#: Noise of a block as drawn, shortened and in the loop's windows, while the next one is drawn.
+COPIES = 4
+#: A chunk's noise is kept below this, however much memory is free [bytes].
+ENOUGH = 1.5e9
+
+
+def lane_bytes(samples: int, channels: int) -> int:
+    """Memory that one trial of a chunk takes [bytes]: its noise, the rest is small."""
+    return 8 * samples * channels * COPIES
+
+
+def choose_chunk(
+    samples: int, channels: int, lanes: int, devices: int, memory_gb: float | None = None
+) -> tuple[int, int]:
+    """Devices to use and trials in a chunk, so that the chunk stays within a quarter of the free
+    memory (or within `memory_gb`).
+
+    Args:
+        samples: length of the longest motion.
+        channels: sequences of noise a trial.
+        lanes: trials side by side on a device.
+        devices: devices there are.
+        memory_gb: bound set by the user [GB].
+
+    Raises:
+        InputError: if not even one device's trials fit.
+    """
+    free = psutil.virtual_memory().available
+    bound = memory_gb * GB if memory_gb else min(free / 4, ENOUGH)
+    each = lane_bytes(samples, channels) * lanes
+    # One block a device is the least there is; then it may take half of what is free.
+    affordable = int((bound if memory_gb else max(bound, free / 2)) // each)
+    if affordable < 1:
+        given = f"--memory {memory_gb:g} GB" if memory_gb else f"{free / GB:.2g} GB are free"
+        raise InputError(
+            f"One chunk of {lanes} trials over {samples} samples takes {each / GB:.2g} GB, but "
+            f"{given}; free some memory or shorten the motions."
+        )
+    devices = min(devices, affordable)
+    block = lanes * devices
+    blocks = max(1, min(MOST_BLOCKS, int(bound // (each * devices))))
+    return devices, block * blocks

@@ -1,0 +1,94 @@
+"""Shares of a study, run apart, become one."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from martths_jax.errors import InputError, raise_all
+from martths_jax.study import provenance
+from martths_jax.study.config import make_config
+from martths_jax.study.files import write_text, writing
+from martths_jax.study.plan import build_plan
+from martths_jax.study.progress import Reporter
+from martths_jax.study.results import Study
+from martths_jax.study.runner import finish, make_engine, read_provenance
+from martths_jax.study.store import PLANTS, RunFolder
+
+
+def merge_runs(
+    out: str | Path,
+    folders: Sequence[str | Path] = (),
+    *,
+    records: str | None = None,
+    signals: bool = True,
+    keep: Sequence[int] = (),
+    reporter: Reporter | None = None,
+) -> Study:
+    """Join the shares of a study and write its results.
+
+    Args:
+        out: folder of the whole; may hold shares itself, or be the only one.
+        folders: further folders with shares of the same study.
+        records: where the ground motions are here, for the signals.
+        signals: run the chosen trials again for their signals.
+        keep: further trials whose signals are stored.
+        reporter: is told what happens.
+
+    Raises:
+        InputError: the shares are of different studies, or trials are missing; what is in `out`
+            stays there.
+    """
+    out, reporter = Path(out), reporter or Reporter()
+    shares = [RunFolder.open(Path(folder)) for folder in folders]
+    run = RunFolder.open(out) if not shares else RunFolder.start(out, shares[0].header)
+    problems = []
+    for share in shares:
+        found = provenance.differences(run.header["identity"], share.header["identity"])
+        if share.trials != run.trials:
+            found.append(f"trials: {run.trials!r} in {out}, {share.trials!r} there")
+        problems += [f"{share.path} holds another study: {text}." for text in found]
+    raise_all(problems, "The folders cannot be merged")
+    for share in shares:
+        if share.path.resolve() != out.resolve():
+            _copy(share, run)
+    raise_all(run.missing(), f"{out} is not complete")
+    engine = _engine(run, records, keep, reporter) if signals else None
+    return finish(run, engine, reporter)
+
+
+def _copy(share: RunFolder, run: RunFolder) -> None:
+    for controller, motion in share.cells:
+        for _, _, path in share.parts(controller, motion):
+            target = run.folder(controller, motion) / path.name
+            if not target.exists():
+                with writing(target) as temporary:
+                    shutil.copyfile(path, temporary)
+    if (share.path / PLANTS).exists() and not (run.path / PLANTS).exists():
+        with writing(run.path / PLANTS) as temporary:
+            shutil.copyfile(share.path / PLANTS, temporary)
+    sessions = read_provenance(run.path)["sessions"]
+    sessions += [s for s in read_provenance(share.path)["sessions"] if s not in sessions]
+    write_text(run.path / "provenance.json", json.dumps({"sessions": sessions}, indent=1))
+
+
+def _engine(run: RunFolder, records: str | None, keep, reporter: Reporter):
+    """Engine that runs chosen trials again; None, and a notice, where that cannot be done."""
+    settings = run.header["config"] | {"out": str(run.path), "keep": tuple(keep)}
+    if records is not None:
+        settings["records"] = records
+    if (run.path / PLANTS).exists():
+        settings |= {"plants": str(run.path / PLANTS), "plants_as": "auto", "draws": "independent"}
+    try:
+        plan = build_plan(make_config(settings))
+        asked = json.loads(json.dumps(provenance.identity(plan)))
+        given = run.header["identity"]
+        skip = {"draws"}  # a stored table of plants stands in for the way it was made
+        raise_all(provenance.differences(*({k: v for k, v in d.items() if k not in skip}
+                                           for d in (given, asked))))  # fmt: skip
+        return make_engine(plan, reporter)
+    except InputError as error:
+        reporter.notice(f"No signals are stored, since the study cannot be run again here: {error}")
+        return None

@@ -1,0 +1,79 @@
+"""`Study`: the results of a study in memory, and where they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from martths_jax.errors import InputError
+from martths_jax.study.dataset import read_dataset
+from martths_jax.study.signals import group
+from martths_jax.study.summary import Summary, summarise
+from martths_jax.watch import Status
+
+
+@dataclass(frozen=True)
+class Study:
+    """Results of a study.
+
+    Attributes:
+        dataset: as in ``study.nc``: ``value`` (controller, motion, trial, index) and so on.
+        folder: of the run.
+    """
+
+    dataset: xr.Dataset
+    folder: Path
+
+    def summary(self) -> Summary:
+        """Percentiles, paired comparison and Table 4 as tables; ``str`` of it is Markdown."""
+        return summarise(self.dataset)
+
+    @property
+    def failed(self) -> int:
+        """Number of runs (controller, motion, trial) that diverged."""
+        return int(np.sum(self.dataset.status.values >= Status.DIVERGED))
+
+    @property
+    def failures(self) -> list[tuple[str, str, int]]:
+        """(controller, motion, trial) of every run that diverged."""
+        status = self.dataset.status
+        return [
+            (str(status.controller.values[i]), str(status.motion.values[j]), int(k))
+            for i, j, k in np.argwhere(status.values >= Status.DIVERGED)
+        ]
+
+    def signals(self, motion: str, controller: str | None = None) -> xr.Dataset:
+        """Stored signals of a controller on a motion; without one, what all share there.
+
+        Raises:
+            InputError: if the study stored none, or knows no such name.
+        """
+        path = self.folder / "signals.nc"
+        if not path.is_file():
+            raise InputError(f"{self.folder} holds no signals; run the study with signals=True.")
+        for name, known in ((motion, self.dataset.motion), (controller, self.dataset.controller)):
+            if name is not None and name not in known.values:
+                raise InputError(f"{name!r} is not in the study; it has {', '.join(known.values)}.")
+        return read_dataset(path, group(motion, controller))
+
+    def __str__(self) -> str:
+        sizes = self.dataset.sizes
+        return (
+            f"Study in {self.folder}: {sizes['controller']} controllers, {sizes['motion']} "
+            f"motions, {sizes['trial'] - 1} trials, {self.failed} runs failed"
+        )
+
+
+def open_study(folder: str | Path) -> Study:
+    """A finished study from its folder.
+
+    Raises:
+        InputError: if there is none, or it is of another version.
+    """
+    path = Path(folder) / "study.nc"
+    if not path.is_file():
+        raise InputError(f"{path} does not exist; give the folder of a finished study.")
+    return Study(read_dataset(path), Path(folder))

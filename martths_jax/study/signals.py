@@ -1,0 +1,145 @@
+"""Signals of chosen trials: the nominal one, the median, the worst, and those asked for.
+
+All of a default study's signals would take gigabytes, so the chosen trials are run again (to the
+same bits) and stored in ``signals.nc``: a group ``/motion/controller`` each, with the dimensions
+(kept, time, ...) and the variables of ``simulation.Result.signals``; in ``/motion`` time, ground
+acceleration and the response of the reference structure.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+import xarray as xr
+
+from martths_jax.indices import NAMES
+from martths_jax.study.dataset import read_dataset, write_dataset
+from martths_jax.study.engine import Engine
+from martths_jax.study.files import writing
+from martths_jax.study.store import FORMAT
+from martths_jax.watch import Status
+
+#: The index that ranks trials.
+RANKED_BY = "J2_1"
+#: Most trials whose signals are held in memory at once.
+BATCH = 16
+#: Dimensions and units of the signals, after (kept, time).
+LAYOUT = {
+    "x_a": (("actuator",), "mm", "target strokes"),
+    "x_m": (("actuator",), "mm", "measured strokes"),
+    "x_hat": (("actuator",), "mm", "estimated strokes"),
+    "u": (("actuator",), "mm", "commands"),
+    "num": (("dof",), "m, rad", "numerical interface and storey motion"),
+    "est": (("interface_dof",), "m, rad", "estimated interface motion"),
+    "force": (("interface_force",), "N, N m", "restoring force"),
+    "C_A": (("coefficient", "actuator"), "1", "adaptive coefficients in scaled derivatives"),
+}
+
+
+def choose_trials(dataset: xr.Dataset, controller: str, motion: str, keep) -> dict[int, str]:
+    """Trials whose signals are stored, and in what role.
+
+    Median and worst are by ``J2_1`` among the uncertain trials that finished; the first that
+    diverged, if any, is stored as ``failed``.
+    """
+    cell = dataset.sel(controller=controller, motion=motion)
+    score = cell.value.values[1:, NAMES.index(RANKED_BY)]
+    roles: dict[int, list[str]] = {0: ["nominal"]}
+    finished = np.flatnonzero(np.isfinite(score))
+    if finished.size:
+        order = finished[np.argsort(score[finished], kind="stable")]
+        roles.setdefault(int(order[(order.size - 1) // 2]) + 1, []).append("median")
+        roles.setdefault(int(order[-1]) + 1, []).append("worst")
+    failed = np.flatnonzero(cell.status.values[1:] >= Status.DIVERGED)
+    if failed.size:
+        roles.setdefault(int(failed[0]) + 1, []).append("failed")
+    for trial in keep:
+        roles.setdefault(int(trial), []).append("kept")
+    return {trial: "+".join(names) for trial, names in roles.items()}
+
+
+def store_signals(engine: Engine, dataset: xr.Dataset, path: Path, keep) -> None:
+    """Run the chosen trials again and write their signals, whole or not at all.
+
+    Raises:
+        InputError: if the disk refuses.
+    """
+    chosen = {
+        (c, m): choose_trials(dataset, c, m, keep)
+        for m in dataset.motion.values
+        for c in dataset.controller.values
+    }
+    asked = json.dumps([dataset.attrs["identity"], [[*k, v] for k, v in chosen.items()]])
+    label = hashlib.sha256(asked.encode()).hexdigest()
+    if path.exists() and _label(path) == label:
+        return
+    for cell in chosen:
+        engine.setup(*cell)  # before the threads start
+    about = {k: dataset.attrs[k] for k in ("version_martths_jax", "git_commit", "seed")}
+    devices = engine.devices
+    with writing(path) as temporary, ThreadPoolExecutor(len(devices)) as pool:
+        write_dataset(xr.Dataset(attrs=about | {"format": FORMAT, "label": label}), temporary)
+        for motion in dataset.motion.values:
+            write_dataset(_shared(engine, motion), temporary, group=group(motion))
+        # A cell a device at a time; written in order, so that the file is reproducible.
+        cells = list(chosen)
+        for i in range(0, len(cells), len(devices)):
+            now = cells[i : i + len(devices)]
+            runs = [
+                pool.submit(_run, engine, *cell, chosen[cell], device)
+                for cell, device in zip(now, devices, strict=False)
+            ]
+            for (controller, motion), run in zip(now, runs, strict=True):
+                write_dataset(run.result(), temporary, group=group(motion, controller))
+
+
+def group(motion: str, controller: str | None = None) -> str:
+    """Name of the group that holds the signals of a motion, or of a controller on it."""
+    return "/" + "/".join(quote(n, safe=" ") for n in (motion, controller) if n is not None)
+
+
+def _label(path: Path) -> str | None:
+    try:
+        return str(read_dataset(path).attrs.get("label"))
+    except ValueError:  # another version's or a damaged file: written anew
+        return None
+
+
+def _shared(engine: Engine, motion: str) -> xr.Dataset:
+    setup = next(s for (_, m), s in engine.setups.items() if m == motion)
+    ground = np.asarray(setup.ground)
+    return xr.Dataset(
+        {
+            "ground": ("time", ground, {"units": "m s-2", "long_name": "ground acceleration"}),
+            "reference": (("time", "dof"), np.asarray(setup.reference), {
+                "units": "m, rad", "long_name": "response of the reference structure"}),
+        },
+        {
+            "time": ("time", np.arange(ground.size) / engine.plan.benchmark.fs, {"units": "s"}),
+            "dof": np.array([4, 28, 2, 26, 3, 27], dtype=np.int32),
+        },
+    )  # fmt: skip
+
+
+def _run(engine: Engine, controller: str, motion: str, roles: dict, device) -> xr.Dataset:
+    trials = np.array(list(roles))
+    batches = [
+        engine.signals(controller, motion, trials[i : i + BATCH], device)
+        for i in range(0, trials.size, BATCH)
+    ]
+    variables = {}
+    for name in batches[0]:
+        values = np.concatenate([np.asarray(b[name]) for b in batches])
+        extra, unit, meaning = LAYOUT.get(
+            name, (tuple(f"{name}_{i}" for i in range(values.ndim - 2)), "", name)
+        )
+        attrs = {"units": unit, "long_name": meaning} if unit else {"long_name": meaning}
+        variables[name] = (("kept", "time", *extra), values, attrs)
+    variables["role"] = ("kept", np.array(list(roles.values())))
+    variables["trial"] = ("kept", trials.astype(np.int32))
+    return xr.Dataset(variables)
