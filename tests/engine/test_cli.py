@@ -1,0 +1,111 @@
+"""The commands of a single run, as a user types them."""
+
+import csv
+import json
+import sys
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from martths_jax import published
+from martths_jax.cli import app, main
+from martths_jax.files import atomic
+from martths_jax.nominal import Comparison, compare_with_table4
+from tests.engine.motions import burst
+
+runner = CliRunner()
+
+
+@pytest.fixture
+def motion_file(tmp_path):
+    """The 0.7 s burst as a CSV file with its unit in the header."""
+    motion = burst()
+    path = tmp_path / "burst.csv"
+    rows = np.column_stack([motion.time, motion.acceleration])
+    np.savetxt(path, rows, delimiter=",", header="time [s],acceleration [m/s^2]", comments="")
+    return path
+
+
+def invoke(*words):
+    """Run ``martths`` in this process and return (exit code, standard error and output)."""
+    result = runner.invoke(app, [str(w) for w in words], terminal_width=200)
+    return result
+
+
+def test_modes_prints_table_1():
+    text = invoke("modes").output
+    for frequency, _ in published.TABLE1.values():
+        assert text.count(f"{frequency:.4f}") == 2, "ours and the published one"
+
+
+def test_run_saves_signals_indices_and_settings(motion_file, tmp_path):
+    out = tmp_path / "out"
+    result = invoke(
+        "run", "--motion", motion_file, "--controller", "lqg", "--trial", 3, "--seed", 5,
+        "--scale", 1.0, "--out", out,
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert sorted(p.name for p in out.iterdir()) == [
+        "burst_lqg_indices.csv",
+        "burst_lqg_run.json",
+        "burst_lqg_signals.npz",
+    ]
+    signals = np.load(out / "burst_lqg_signals.npz")
+    for name, width in (("x_a", 2), ("x_m", 2), ("u", 2), ("num", 6), ("ref", 6), ("est", 2)):
+        assert signals[name].shape == (signals["time"].size, width)
+    rows = list(csv.DictReader((out / "burst_lqg_indices.csv").open()))
+    assert len(rows) == 24
+    error = signals["x_m"] - signals["x_a"]
+    j2 = 100 * np.sqrt(np.sum(error**2, 0) / np.sum(signals["x_a"] ** 2, 0))
+    by_name = {row["index"]: float(row["value"]) for row in rows}
+    assert by_name["J2_1"] == pytest.approx(j2[0])
+    about = json.loads((out / "burst_lqg_run.json").read_text())
+    assert (about["trial"], about["seed"], about["scale"]) == (3, 5, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["run", "--motion", "no-such-motion", "--out", "x"], "no-such-motion"),
+        (["run", "--motion", "elcentro-like", "--out", "x", "--fs", "-1"], "fs"),
+        (["table4", "--records", "/no/such/folder"], "/no/such/folder"),
+    ],
+)
+def test_user_errors_are_one_message_and_exit_code_2(words, message, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["martths", *words])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 2
+    text = capsys.readouterr().err
+    assert message in text
+    assert "Traceback" not in text
+
+
+def test_an_interrupted_write_leaves_what_was_there(tmp_path):
+    path = tmp_path / "result.txt"
+    path.write_text("old")
+    with pytest.raises(KeyboardInterrupt), atomic(path) as part:
+        part.write_text("ne")
+        raise KeyboardInterrupt
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_comparison_with_table_4(benchmark):
+    found = compare_with_table4(benchmark, [burst()])
+    rows = found.rows()
+    assert len(rows) == 48
+    assert {r["controller"] for r in rows} == {"lqg", "adfc"}
+    for r in rows:
+        assert r["deviation_percent"] == pytest.approx(
+            100 * (r["martths_jax"] / r["published"] - 1)
+        )
+    assert found.to_csv().count("\n") == 49
+    assert found.to_markdown().count("\n") == 26
+
+
+def test_comparison_averages_over_motions():
+    each = {"adfc": {"a": dict.fromkeys(published.TABLE4, 1.0)}}
+    table = Comparison(("a",), {"adfc": each["adfc"]["a"]}, each).to_markdown()
+    assert "| J2_1 | 1.00 | 3.9 | -74.4 % |" in table
