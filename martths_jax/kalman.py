@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy import linalg
 
+from martths_jax.design.riccati import dense_kalman_gain
 from martths_jax.errors import argument_error
 from martths_jax.structure.modal import ModalSystem, advance, output, spread, to_dense
 
@@ -88,12 +89,15 @@ def design_kalman(model: ModalSystem, q: float, r: float) -> KalmanFilter:
 
     Args:
         model: nominal plant (T = 1).
-        q: process noise through the plant's input [mm^2].
+        q: process noise through the plant's input [mm^2]; may be traced.
         r: measurement noise a sample [mm^2].
 
     Raises:
         InputError: if q or r is not positive and finite.
     """
+    if isinstance(q, jax.core.Tracer):
+        A, B, C, _ = to_dense(model)
+        return KalmanFilter(model=model, filter_gain=dense_kalman_gain(A, B, C, q, r))
     for name, value in (("q", q), ("r", r)):
         if not (np.isfinite(value) and value > 0):
             raise argument_error(name, "be positive and finite (mm^2)", value)
