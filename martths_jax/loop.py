@@ -129,7 +129,9 @@ def run(
     trials: int,
     lags: tuple[int, int],
     keep: int = 0,
-) -> tuple[IndexSums, watching.Watch, dict[str, jax.Array]]:
+    segment: int = 0,
+    tally: Any = None,
+) -> tuple[IndexSums, watching.Watch, dict[str, jax.Array], Any]:
     """Run a batch of trials over a whole motion.
 
     The scan over time is nested: windows of the controller's buffer length outside, samples
@@ -144,9 +146,14 @@ def run(
         trials: number T of trials in the batch.
         lags: (lead, lag) range of the cross-correlations [samples].
         keep: return the signals of the first so many trials too.
+        segment: for reverse mode: keep the state only once in so many samples (a divisor of the
+            window) and go through the segment again for its derivative; 0 keeps every sample's.
+        tally: more running sums, an object with ``init(trials) -> sums`` and
+            ``add(sums, signals, reference, valid) -> sums``.
 
     Returns:
-        sums for the indices, watch for the status, signals (N, ..., T) (empty if `keep` is 0).
+        sums for the indices, watch for the status, signals (N, ..., T) (empty if `keep` is 0), what
+        the tally has summed (None without one).
     """
     N = ground.shape[0]
     length = controller.window or WINDOW
@@ -157,7 +164,7 @@ def run(
         return padded.reshape(windows, length, *x.shape[1:])
 
     def sample(moving, inputs):
-        state, sums, watch = moving
+        state, sums, watch, extra = moving
         k, ground_k, reference_k, noise_k, delayed = inputs
         state, signals, record = sample_period(
             benchmark, controller, plant, state, k, ground_k, noise_k, delayed
@@ -165,37 +172,54 @@ def run(
         valid = k < N
         sums = _accumulate(sums, signals, reference_k[:, None], valid)
         watch = watching.update(watch, k, valid, signals)
+        if tally is not None:
+            extra = tally.add(extra, signals, reference_k[:, None], valid)
         strokes = tuple(
             jnp.where(valid, signals[name][i], 0.0)
             for name in ("x_a", "x_m", "x_hat")
             for i in range(2)
         )
         kept = {name: x[..., :keep] for name, x in signals.items()} if keep else {}
-        return (state, sums, watch), (strokes, record, kept)
+        return (state, sums, watch, extra), (strokes, record, kept)
+
+    def piece(carry, inputs):
+        moving, tail, correlation = carry
+        moving, (strokes, records, signals) = jax.lax.scan(sample, moving, inputs)
+        added, tail = _correlate_window(tail, strokes, lags)
+        return (moving, tail, jax.tree.map(jnp.add, correlation, added)), (records, signals)
 
     def window(carry, inputs):
-        moving, records, tail, correlation = carry
-        moving, (strokes, records, signals) = jax.lax.scan(sample, moving, (*inputs, records))
-        state, sums, watch = moving
+        records, carry = carry
+        inputs = (*inputs, records)
+        if segment:
+            cut = lambda x: x.reshape(length // segment, segment, *x.shape[1:])  # noqa: E731
+            join = lambda x: x.reshape(length, *x.shape[2:])  # noqa: E731
+            body = jax.checkpoint(piece, prevent_cse=False)
+            carry, outputs = jax.lax.scan(body, carry, jax.tree.map(cut, inputs))
+            records, signals = jax.tree.map(join, outputs)
+        else:
+            carry, (records, signals) = piece(carry, inputs)
+        (state, *sums), *correlations = carry
         state = replace(state, controller=controller.turn(state.controller))
-        added, tail = _correlate_window(tail, strokes, lags)
-        correlation = jax.tree.map(jnp.add, correlation, added)
-        return ((state, sums, watch), records, tail, correlation), signals
+        return (records, ((state, *sums), *correlations)), signals
 
     blank = controller.blank_record(trials)
     records = jax.tree.map(lambda x: jnp.zeros((length, *x.shape), x.dtype), blank)
     state = initial_state(benchmark, controller, plant, trials)
+    extra = None if tally is None else tally.init(trials)
     carry = (
-        (state, blank_sums(trials), watching.init(trials)),
         records,
-        (jnp.zeros((sum(lags), trials)),) * 6,
-        (jnp.zeros((sum(lags) + 1, trials)),) * 4,
+        (
+            (state, blank_sums(trials), watching.init(trials), extra),
+            (jnp.zeros((sum(lags), trials)),) * 6,
+            (jnp.zeros((sum(lags) + 1, trials)),) * 4,
+        ),
     )
     samples = jnp.arange(windows * length).reshape(windows, length)
     inputs = (samples, *map(in_windows, (ground, reference, noise)))
     carry, signals = jax.lax.scan(window, carry, inputs)
 
-    (_, sums, watch), _, tail, correlation = carry
+    _, ((_, sums, watch, extra), tail, correlation) = carry
     # The last `lead` samples still wait for targets that come after them: none do.
     nothing = (jnp.zeros((lags[0], trials)),) * 6
     correlation = jax.tree.map(jnp.add, correlation, _correlate_window(tail, nothing, lags)[0])
@@ -206,7 +230,7 @@ def run(
         lags=lags,
         fs=benchmark.fs,
     )
-    return index_sums, watch, signals
+    return index_sums, watch, signals, extra
 
 
 def _accumulate(sums, signals, reference, valid):

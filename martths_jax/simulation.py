@@ -172,7 +172,7 @@ def prepare(controller, benchmark: Benchmark, trials: int) -> tuple[Controller, 
 def run_traced(setup: Setup, plants, noise, keep: bool):
     """All trials as one block, nothing leaves the trace; signals come trial first."""
     samples, fs = setup.ground.shape[0], setup.benchmark.fs
-    sums, watch, signals = loop.run(
+    sums, watch, signals, _ = loop.run(
         setup.benchmark,
         setup.controller,
         plants.discretise(setup.benchmark.dt),
@@ -269,7 +269,7 @@ def compiled(devices: tuple, per_trial: tuple[bool, ...], own_noise: bool, lags,
             trials=LANES,
             lags=lags,
             keep=kept,
-        )
+        )[:3]
         return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), outcome)
 
     def program(benchmark, controller, plants, ground, reference, noise):
