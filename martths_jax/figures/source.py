@@ -1,0 +1,123 @@
+"""What the figures are drawn from: a finished study, one trial's histories, one chosen motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from martths_jax.errors import InputError
+from martths_jax.figures.style import controller_position
+from martths_jax.study import Study, open_study
+
+#: Zoom windows of the benchmark's plots [s], by the record's name (benchmark's plotting scripts).
+ZOOM = {
+    "elcentro": ((7.0, 8.0), (14.0, 15.0), (31.0, 32.0)),
+    "kobe": ((8.5, 9.5), (10.0, 12.0), (14.0, 15.0)),
+    "morganhill": ((7.0, 8.0), (9.5, 11.0), (11.3, 13.0)),
+}
+
+
+@dataclass
+class Source:
+    """A study as the figures see it.
+
+    Attributes:
+        study: the results.
+        trial: whose histories are drawn, 0 = nominal plant.
+        motion: of the figures that show one motion.
+    """
+
+    study: Study
+    trial: int
+    motion: str
+    _read: dict = field(default_factory=dict, repr=False)
+
+    @property
+    def controllers(self) -> list[str]:
+        """Names of the controllers, in the study's order."""
+        return [str(c) for c in self.study.dataset.controller.values]
+
+    @property
+    def motions(self) -> list[str]:
+        """Names of the motions, in the study's order."""
+        return [str(m) for m in self.study.dataset.motion.values]
+
+    @property
+    def fs(self) -> float:
+        """Sampling rate [Hz]."""
+        return float(np.ravel(self.study.dataset.attrs["fs"])[0])
+
+    @property
+    def who(self) -> str:
+        """The trial in words."""
+        return "nominal plant" if self.trial == 0 else f"trial {self.trial}"
+
+    def position(self, controller: str) -> int:
+        """Which look a controller has (see ``style.look``)."""
+        return controller_position(controller, self.controllers)
+
+    def values(self, controller: str, motion: str, index: str) -> np.ndarray:
+        """(trials,) index of the uncertain trials, NaN where one diverged."""
+        cell = self.study.dataset.value.sel(controller=controller, motion=motion, index=index)
+        return cell.values[1:]
+
+    def shared(self, motion: str):
+        """Time, ground acceleration and reference response of a motion."""
+        if motion not in self._read:
+            self._read[motion] = self.study.signals(motion)
+        return self._read[motion]
+
+    def history(self, controller: str, motion: str) -> dict[str, np.ndarray]:
+        """Signals (N, ...) of the trial; ``InputError`` if the study has not kept them."""
+        key = controller, motion
+        if key not in self._read:
+            stored = self.study.signals(motion, controller)
+            kept = stored.trial.values.tolist()
+            if self.trial not in kept:
+                raise InputError(
+                    f"{self.study.folder} keeps no signals of trial {self.trial} ({controller} on "
+                    f"{motion}; kept are {', '.join(map(str, kept))}); `martths replay "
+                    f"{self.study.folder} --trial {self.trial}` adds them."
+                )
+            chosen = stored.isel(kept=kept.index(self.trial))
+            self._read[key] = {
+                name: v.values for name, v in chosen.data_vars.items() if "time" in v.dims
+            }
+        return self._read[key]
+
+    def zoom_windows(self, motion: str) -> tuple[tuple[float, float], ...]:
+        """Three windows [s]: the benchmark's, or about the largest strokes of each third."""
+        known = ZOOM.get(motion.removesuffix("-like"))
+        time = self.shared(motion).time.values
+        if known and time[-1] > known[-1][1]:
+            return known
+        stroke = np.max(np.abs(self.history(self.controllers[-1], motion)["x_a"]), axis=1)
+        width = min(1.0, time[-1] / 6)
+        found = []
+        for third in np.array_split(np.arange(time.size), 3):
+            middle = time[third[np.argmax(stroke[third])]]
+            first = float(np.clip(middle - width / 2, time[third[0]], time[third[-1]] - width))
+            found.append((first, first + width))
+        return tuple(found)
+
+
+def open_source(folder: Path | str, trial: int = 0, motion: str | None = None) -> Source:
+    """Open a study for drawing.
+
+    Args:
+        folder: of a finished study.
+        trial: whose histories are drawn.
+        motion: of the figures that show one motion; El Centro if it is there, else the first.
+
+    Raises:
+        InputError: no such study or motion.
+    """
+    study = open_study(folder)
+    names = [str(m) for m in study.dataset.motion.values]
+    if motion is None:
+        motion = next((n for n in names if n.startswith("elcentro")), names[0])
+    if motion not in names:
+        raise InputError(f"Motion {motion!r} is not in {folder}; it has {', '.join(names)}.")
+    return Source(study, trial, motion)

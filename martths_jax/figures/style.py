@@ -1,0 +1,151 @@
+"""One look for all figures: journal widths, a colour-blind safe palette, lines that print in grey.
+
+Colours are those of Okabe and Ito (2008); whatever a colour tells, a dash pattern, a marker or a
+shade of clearly other lightness tells too.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from martths_jax.files import atomic
+
+MM = 1 / 25.4  # inch per mm
+#: Widths of one and of two journal columns [mm].
+SINGLE, DOUBLE = 85.0, 174.0
+BLUE, VERMILLION, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
+TARGET = {"color": "0.68", "lw": 2.2, "ls": "-"}
+#: Line, marker and fill of the things a figure compares, in the order in which they appear.
+LOOKS = (
+    {"color": VERMILLION, "ls": (0, (4, 1.4)), "marker": "s", "fill": "#F2B58C"},
+    {"color": BLUE, "ls": "-", "marker": "o", "fill": "#3B7FA8"},
+    {"color": GREEN, "ls": (0, (1, 1)), "marker": "^", "fill": "#8FD0BC"},
+    {"color": PURPLE, "ls": (0, (5, 1, 1, 1)), "marker": "D", "fill": "#E8C4D8"},
+    {"color": "black", "ls": (0, (3, 1, 1, 1, 1, 1)), "marker": "v", "fill": "0.5"},
+)
+_RC = {
+    "font.family": "sans-serif",
+    "font.size": 7.5,
+    "axes.titlesize": 8,
+    "axes.labelsize": 7.5,
+    "legend.fontsize": 7,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "lines.linewidth": 0.9,
+    "lines.markersize": 3.2,
+    "axes.grid": True,
+    "grid.linewidth": 0.4,
+    "grid.color": "0.88",
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "mathtext.fontset": "dejavusans",
+    "pdf.fonttype": 42,
+    "agg.path.chunksize": 20000,
+}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure and the numbers in it.
+
+    Attributes:
+        figure: a matplotlib ``Figure``.
+        data: columns of equal length by name, units in the names; what is drawn.
+        caption: what is shown, for the report and for the page beside the figures.
+    """
+
+    figure: Any
+    data: Mapping[str, Any]
+    caption: str
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Settings under which figures are drawn and saved."""
+    import matplotlib
+
+    with matplotlib.rc_context(_RC):
+        yield
+
+
+def new_figure(width_mm: float, height_mm: float):
+    """Empty figure of a size on paper, which lays its axes out without overlaps."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width_mm * MM, height_mm * MM), layout="constrained")
+
+
+def look(position: int) -> dict:
+    """Colour, dashes and marker of the thing at a position among those compared."""
+    return LOOKS[position % len(LOOKS)]
+
+
+def line(position: int) -> dict:
+    """Keyword arguments of a line (see ``look``)."""
+    return {k: look(position)[k] for k in ("color", "ls")}
+
+
+def controller_position(name: str, all_names) -> int:
+    """Position of a controller: LQG and ADFC look the same in every study."""
+    fixed = {"lqg": 0, "adfc": 1}
+    others = [n for n in all_names if n not in fixed]
+    return fixed[name] if name in fixed else 2 + others.index(name)
+
+
+def index_label(name: str) -> str:
+    """``J5_28`` as it is typeset."""
+    number, _, where = name[1:].partition("_")
+    return f"$J_{{{number},{where}}}$"
+
+
+def controller_label(name: str) -> str:
+    """Name of a controller for a legend: abbreviations in capitals."""
+    return name.upper() if name in ("lqg", "adfc") else name
+
+
+def motion_label(name: str) -> str:
+    """Name of a motion for a title."""
+    base, dash, rest = name.partition("-")
+    known = {"elcentro": "El Centro", "kobe": "Kobe", "morganhill": "Morgan Hill"}
+    return known.get(base, base) + dash + rest
+
+
+def save(drawing: Drawing, folder: Path, name: str, formats=("pdf", "png"), dpi: int = 300):
+    """Write a drawing in each format, and what is drawn as CSV.
+
+    Returns:
+        paths of the files.
+
+    Raises:
+        InputError: if the folder or a file cannot be written.
+    """
+    paths = []
+    for kind in formats:
+        # No time of day in the files, so that the same study gives the same bytes.
+        extra = {"metadata": {"CreationDate": None}} if kind == "pdf" else {}
+        with atomic(Path(folder) / f"{name}.{kind}") as part:
+            drawing.figure.savefig(part, dpi=dpi, **extra)
+        paths.append(Path(folder) / f"{name}.{kind}")
+    path = Path(folder) / f"{name}.csv"
+    with atomic(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(drawing.data)
+        columns = [_cells(np.asarray(column)) for column in drawing.data.values()]
+        writer.writerows(zip(*columns, strict=True))
+    return [*paths, path]
+
+
+def _cells(column: np.ndarray) -> list:
+    if column.dtype.kind != "f":
+        return column.tolist()
+    return ["" if x != x else f"{x:.9g}" for x in column.tolist()]
