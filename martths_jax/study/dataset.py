@@ -61,6 +61,8 @@ def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
             "flag_meanings": " ".join(s.name.lower() for s in Status)}),
         "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
             "long_name": "largest valve command", "units": "V"}),
+        "held": (cell, gather(lambda o: o.held), {
+            "long_name": "fits that the controller did not use", "units": "1"}),
         "draw": (("trial", "parameter"), np.asarray(plants.draws), {
             "long_name": "standard normal draws of the plant", "units": "1"}),
         "plant_hz": (("trial", "parameter"), np.asarray(plants.parameters_hz), {

@@ -43,12 +43,14 @@ class Outcome:
         status: (T,) ``Status``.
         first: (T, 4, 2) first samples at which ``FIRSTS`` happened, NaN for never; by actuator.
         volt_peak: (T, 2) largest valve commands [V].
+        held: (T,) number of fits that the controller did not use.
     """
 
     value: np.ndarray
     status: np.ndarray
     first: np.ndarray
     volt_peak: np.ndarray
+    held: np.ndarray
 
     def __getitem__(self, which) -> Outcome:
         return Outcome(*(x[which] for x in self.arrays().values()))
@@ -170,6 +172,7 @@ class Engine:
             status=result.status.astype(np.int32),
             first=np.moveaxis(np.where(first >= NEVER, np.nan, first), -1, 0),
             volt_peak=np.asarray(watch.volt_peak).T,
+            held=np.asarray(getattr(watch, "held", np.zeros(trial.size))).astype(np.int32),
         )
 
 

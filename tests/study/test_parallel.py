@@ -1,0 +1,124 @@
+"""Shares of a study in separate processes, alone or under JAX's distributed runtime."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from martths_jax import InputError
+from martths_jax.study import merge_runs, open_study, run_study
+from martths_jax.study.distributed import join
+from martths_jax.study.runner import share_of
+from tests.study.places import ONE_BLOCK, result_bytes, short_motion, small
+
+ROOT = Path(__file__).resolve().parents[2]
+#: A process of a study: runs its share, as the command line does.
+WORKER = """
+import sys
+sys.path.insert(0, {root!r})
+from martths_jax.study import provenance, run_study
+from martths_jax.study.distributed import join
+from tests.study.places import ONE_BLOCK, small
+provenance.git_commit = lambda: "0000000"
+share = join("localhost:{port}", 2, {number})
+done = run_study(small({folder!r}, trials=300, memory_gb=ONE_BLOCK), share=share, together=True)
+assert (done is not None) == ({number} == 0)
+"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole")
+    return run_study(small(folder, trials=300, memory_gb=ONE_BLOCK))
+
+
+def free_port() -> int:
+    with socket.socket() as s:
+        s.bind(("localhost", 0))
+        return s.getsockname()[1]
+
+
+def test_two_processes_of_the_distributed_runtime(whole, tmp_path, compile_cache):
+    port = free_port()
+    environment = compile_cache | {"MARTHS_DEVICES": "1"}
+    workers = [
+        subprocess.Popen(
+            [sys.executable, "-c",
+             WORKER.format(root=str(ROOT), port=port, number=i, folder=str(tmp_path))],
+            env=environment, stderr=subprocess.PIPE, text=True,
+        )
+        for i in range(2)
+    ]  # fmt: skip
+    errors = [w.communicate(timeout=300)[1] for w in workers]
+    assert [w.returncode for w in workers] == [0, 0], errors
+    assert result_bytes(tmp_path) == result_bytes(whole.folder)
+    sessions = json.loads((tmp_path / "provenance.json").read_text())["sessions"]
+    assert sorted(s["trials"] for s in sessions) == [2 * 150, 2 * 151]
+
+
+def test_shares_merge_into_the_whole(whole, tmp_path):
+    settings = small(tmp_path / "a", trials=300, memory_gb=ONE_BLOCK)
+    assert run_study(settings, share=(1, 3)) is None
+    assert run_study(settings, share=(3, 3)) is None
+    with pytest.raises(InputError, match=r"passthrough on two: trials 100-199 are missing"):
+        merge_runs(tmp_path / "a")
+    assert run_study(settings | {"out": str(tmp_path / "b")}, share=(2, 3)) is None
+    said = []
+    merged = merge_runs(tmp_path / "all", [tmp_path / "a", tmp_path / "b"], reporter=Says(said))
+    assert result_bytes(tmp_path / "all") == result_bytes(whole.folder)
+    assert merged.dataset.equals(open_study(tmp_path / "all").dataset)
+    # These motions are objects of this test, so the merged study cannot be run again.
+    assert any("No signals are stored" in text for text in said)
+
+
+class Says:
+    def __init__(self, into):
+        self.notice = into.append
+
+
+def test_shares_of_different_studies_do_not_merge(whole, tmp_path):
+    run_study(small(tmp_path / "other", motions=(short_motion("one"),)), share=(1, 1))
+    with pytest.raises(InputError, match="holds another study"):
+        merge_runs(tmp_path / "all", [whole.folder, tmp_path / "other"])
+    with pytest.raises(InputError, match="holds no study"):
+        merge_runs(tmp_path / "all", [tmp_path / "nothing"])
+
+
+@pytest.mark.parametrize("shares", [1, 2, 7, 16])
+def test_every_trial_is_in_one_share(shares):
+    parts = [share_of(101, (i, shares)) for i in range(1, shares + 1)]
+    assert np.array_equal(np.sum(parts, axis=0), np.ones(101))
+    sizes = [p.sum() for p in parts]
+    assert max(sizes) - min(sizes) <= 1
+    with pytest.raises(InputError, match="share"):
+        share_of(101, (shares + 1, shares))
+
+
+def test_fresh_is_refused_for_a_share(tmp_path):
+    with pytest.raises(InputError, match="fresh"):
+        run_study(small(tmp_path), share=(1, 2), fresh=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("host:1", None, None), "--num-processes is missing"),
+        ((None, 2, 0), "--coordinator is missing"),
+        (("host:1", 2, 2), r"must lie in 0 \.\.\. 1"),
+    ],
+)
+def test_incomplete_options_are_named(options, message):
+    with pytest.raises(InputError, match=message):
+        join(*options)
+
+
+def test_a_process_alone_says_what_it_misses():
+    if os.environ.get("SLURM_JOB_ID"):
+        pytest.skip("is about a machine without a cluster's variables")
+    with pytest.raises(InputError, match="cannot be joined"):
+        join(None, None, None)
