@@ -65,6 +65,11 @@ class Result:
         """(T,) whether a trial diverged, so that it has no indices."""
         return self.status >= Status.DIVERGED
 
+    def describe(self, position: int) -> str:
+        """What happened in the trial at `position`: its status, which actuator, from when."""
+        line = watching.describe(self.watch, range(len(self.trial))[position], self.fs)
+        return f"Trial {int(np.asarray(self.trial)[position])} {line}"
+
     def __str__(self) -> str:
         counts = {s.name.lower(): int(np.sum(self.status == s)) for s in Status}
         ended = ", ".join(f"{n} {name}" for name, n in counts.items() if n)
@@ -110,9 +115,9 @@ def simulate(
 
     Inside ``jax.grad`` or another transformation the batch runs as one block and stays traced.
     """
+    checks.check_simulation(benchmark, controller, plants, motion, noise, keep, progress)
     controller, per_trial = prepare(controller, benchmark, len(plants))
     noise = SensorNoise() if noise is None else noise
-    checks.check_simulation(benchmark, controller, plants, motion, noise)
     ground = jnp.asarray(motion.acceleration)
     reference = reference_response(benchmark, ground)
     setup = Setup(benchmark, controller, per_trial, ground, reference)

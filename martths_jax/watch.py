@@ -7,6 +7,7 @@ from enum import IntEnum
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from martths_jax.benchmark import VOLT_LIMIT, command_volts
 
@@ -17,7 +18,13 @@ NEVER = float(2**53)
 
 
 class Status(IntEnum):
-    """How a trial ended, in order of gravity."""
+    """How a trial ended, in order of gravity.
+
+    SATURATED: a valve was asked for more than its limit; the run is whole and has indices (the
+    valves are only monitored).  DIVERGED: a command or stroke left its range.  NONFINITE: a stroke
+    turned into NaN or infinity without having left its range before.  The last two are *lost*:
+    their indices are NaN.
+    """
 
     OK = 0
     SATURATED = 1
@@ -35,7 +42,9 @@ class Watch:
         command: (2, T) a command left its range or is not a number.
         stroke: (2, T) a measured stroke left its range or is not a number.
         nonfinite: (2, T) a measured stroke is not finite.
-        volt_peak: (2, T) largest valve command [V].
+        volt_peak: (2, T) largest valve command while it was in range [V].
+        held: (T,) number of fits that the controller did not use, because their normal matrix was
+            singular or too badly conditioned; 0 for controllers that fit nothing.
     """
 
     saturated: jax.Array
@@ -43,12 +52,13 @@ class Watch:
     stroke: jax.Array
     nonfinite: jax.Array
     volt_peak: jax.Array
+    held: jax.Array
 
 
 def init(trials: int) -> Watch:
     """Nothing has happened yet."""
     never = jnp.full((2, trials), NEVER)
-    return Watch(never, never, never, never, jnp.zeros((2, trials)))
+    return Watch(never, never, never, never, jnp.zeros((2, trials)), jnp.zeros(trials))
 
 
 def update(watch: Watch, k: jax.Array, valid: jax.Array, signals: dict[str, jax.Array]) -> Watch:
@@ -57,9 +67,10 @@ def update(watch: Watch, k: jax.Array, valid: jax.Array, signals: dict[str, jax.
     Args:
         k: number of the sample.
         valid: whether it belongs to the record.
-        signals: ``u`` and ``x_m`` (2, T) [mm].
+        signals: ``u`` and ``x_m`` (2, T) [mm], and ``held`` (T,) from controllers that count it.
     """
     volts = jnp.abs(command_volts(signals["u"]))
+    in_range = jnp.abs(signals["u"]) <= RUNAWAY_MM
     now = jnp.where(valid, k.astype(float), NEVER)
 
     def first(so_far, good):
@@ -68,10 +79,11 @@ def update(watch: Watch, k: jax.Array, valid: jax.Array, signals: dict[str, jax.
     return Watch(
         saturated=first(watch.saturated, ~(volts > VOLT_LIMIT)),
         # NaN compares false, so it counts as out of range.
-        command=first(watch.command, jnp.abs(signals["u"]) <= RUNAWAY_MM),
+        command=first(watch.command, in_range),
         stroke=first(watch.stroke, jnp.abs(signals["x_m"]) <= RUNAWAY_MM),
         nonfinite=first(watch.nonfinite, jnp.isfinite(signals["x_m"])),
-        volt_peak=jnp.where(valid, jnp.maximum(watch.volt_peak, volts), watch.volt_peak),
+        volt_peak=jnp.where(valid & in_range & (volts > watch.volt_peak), volts, watch.volt_peak),
+        held=jnp.where(valid, signals.get("held", watch.held), watch.held),
     )
 
 
@@ -85,3 +97,42 @@ def status_of(watch: Watch) -> jax.Array:
     status = jnp.where(happened(watch.saturated), Status.SATURATED, Status.OK)
     status = jnp.where(runaway, Status.DIVERGED, status)
     return jnp.where(at_once, Status.NONFINITE, status)
+
+
+def describe(watch: Watch, trial: int, fs: float) -> str:
+    """One line about a trial: its status, and what happened first, where and when.
+
+    Args:
+        watch: of a finished run.
+        trial: position in the batch.
+        fs: sampling rate [Hz].
+    """
+    status = Status(int(np.asarray(status_of(watch))[trial]))
+    column = lambda name: np.asarray(getattr(watch, name))[..., trial]  # noqa: E731
+    parts = []
+    if status >= Status.DIVERGED:
+        limit = f"left +-{RUNAWAY_MM:g} mm or became NaN"
+        causes = [("command", limit), ("stroke", limit), ("nonfinite", "is not finite")]
+        if status == Status.NONFINITE:
+            causes.reverse()
+        # `min` keeps the first of equals: the cause before its consequence.
+        first, i, name, what = min(
+            ((column(name)[i], i, name, what) for name, what in causes for i in range(2)),
+            key=lambda event: event[0],
+        )
+        signal = "command u" if name == "command" else "measured stroke x_m"
+        parts.append(f"{signal} of actuator {i + 1} {what} at {_when(first, fs)}")
+    for i in range(2):
+        first = column("saturated")[i]
+        if first != NEVER:
+            parts.append(
+                f"actuator {i + 1} beyond {VOLT_LIMIT:g} V from {_when(first, fs)}, "
+                f"peak {column('volt_peak')[i]:.3g} V"
+            )
+    if column("held"):
+        parts.append(f"{int(column('held'))} fits not used")
+    return f"{status.name.lower()}: {'; '.join(parts)}" if parts else status.name.lower()
+
+
+def _when(sample: float, fs: float) -> str:
+    return f"sample {int(sample)} ({sample / fs:.3f} s)"

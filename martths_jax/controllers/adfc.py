@@ -17,7 +17,8 @@ import numpy as np
 
 from martths_jax.controllers import least_squares as ls
 from martths_jax.controllers.base import Controller, Decision
-from martths_jax.errors import InputError, argument_error
+from martths_jax.controllers.inverse import nominal_inverse
+from martths_jax.errors import argument_error, raise_all
 from martths_jax.kalman import design_kalman
 
 #: Backward differences of second order for value and dt^j times the j-th derivative, from
@@ -31,6 +32,11 @@ BACKWARD_DIFFERENCES = np.array(
     ]
 )
 TAPS = BACKWARD_DIFFERENCES.shape[1]
+#: Coefficients that do nothing: u follows x_a.
+FOLLOW_TARGET = np.zeros((8, 2))
+FOLLOW_TARGET[0, 0] = FOLLOW_TARGET[4, 1] = 1.0
+#: A fit whose normal matrix is worse conditioned is not used (the paper's bound).
+CONDITION_LIMIT = 1e14
 
 
 @jax.tree_util.register_dataclass
@@ -41,21 +47,27 @@ class ADFC(Controller):
     Attributes:
         nb: buffer length N_b, rows in the fit.
         no: overlap N_o of successive fits; a new C_A comes every N_b - N_o samples.
-        pull: weight lambda of the pull towards the start coefficients, added to the normal matrix
-            in scaled derivatives [mm^2]; 0 is the paper's literal least squares.
+        pull: weight lambda of the pull towards `anchor`, added to the normal matrix in scaled
+            derivatives [mm^2]; 0 is the paper's literal least squares.  See docs/guarded_adfc.md
+            for the evidence behind the default.
         q: process noise of the Kalman filter [mm^2].
         start: (8, 2) coefficients C_0 until the buffer is full; None follows the target (u = x_a).
+        anchor: (8, 2) coefficients that the fit is pulled to; None is the inverse of the nominal
+            plant (``nominal_inverse``).
         solver: ``ldl`` (unrolled, fast) or ``lu`` (``jnp.linalg.solve``, the reference).
         estimator: the Kalman filter, designed by ``prepare``.
 
-    Scalars may be given as arrays over trials (T,).
+    Scalars may be given as arrays over trials (T,).  A fit whose normal matrix is singular or
+    worse conditioned than 1e14 leaves the last good coefficients in place; ``Result.watch.held``
+    counts these.
     """
 
     nb: int = field(default=1024, metadata={"static": True})
     no: jax.Array | int = 1023
-    pull: jax.Array | float = 1e-5
+    pull: jax.Array | float = 6e-5
     q: jax.Array | float = 3e-5
     start: jax.Array | None = None
+    anchor: jax.Array | None = None
     solver: str = field(default="ldl", metadata={"static": True})
     estimator: Any = None
 
@@ -64,9 +76,7 @@ class ADFC(Controller):
     def __post_init__(self):
         numbers = (self.no, self.pull, self.q)
         if all(type(x) in (int, float) for x in numbers):  # not when JAX rebuilds it from leaves
-            problems = self.problems(None)
-            if problems:
-                raise InputError(problems[0])
+            raise_all(self.problems(None), "The controller cannot be used")
 
     @property
     def window(self) -> int:
@@ -94,22 +104,26 @@ class ADFC(Controller):
         if q is not None:
             expect(np.all(np.isfinite(q) & (q > 0)), "q", "be positive (mm^2)", q)
         expect(self.solver in ls.SOLVERS, "solver", f"be one of {sorted(ls.SOLVERS)}", self.solver)
-        if self.start is not None:
-            shape = np.shape(self.start)
-            expect(shape[:2] == (8, 2) and len(shape) in (2, 3), "start", "be (8, 2)", shape)
+        for name in ("start", "anchor"):
+            value = known(getattr(self, name))
+            if value is None or value.dtype == object:  # not given, or traced
+                continue
+            good = value.shape[:2] == (8, 2) and value.ndim in (2, 3)
+            expect(good, name, "be (8, 2)", f"shape {value.shape}")
+            expect(np.all(np.isfinite(value)), name, "be finite", "NaN or infinity")
         return found
 
     def prepare(self, benchmark):
-        start = self.start
-        if start is None:
-            start = np.zeros((8, 2))
-            start[0, 0] = start[4, 1] = 1.0
-        start = jnp.asarray(start, dtype=float)
+        start = FOLLOW_TARGET if self.start is None else self.start
+        anchor = self.anchor
+        if anchor is None:
+            anchor = nominal_inverse(benchmark.plant_model, benchmark.fs, BACKWARD_DIFFERENCES)
         return replace(
             self,
             no=jnp.asarray(self.no),
             pull=jnp.asarray(self.pull, dtype=float),
-            start=start,
+            start=jnp.asarray(start, dtype=float),
+            anchor=jnp.asarray(anchor, dtype=float),
             estimator=design_kalman(benchmark.plant_model, self.q, benchmark.r_mm2),
         )
 
@@ -130,6 +144,8 @@ class ADFC(Controller):
             "leaving": taps,
             "target": taps,
             "command": (zero, zero),
+            # Fits that were not used so far.
+            "held": zero,
         }
 
     def blank_record(self, trials):
@@ -148,9 +164,12 @@ class ADFC(Controller):
         # The first fit waits until no row in the buffer reaches back before the first sample.
         since_full, hop = seen.k - (self.nb + TAPS - 1), self.nb - self.no
         due = (since_full >= 0) & (since_full % hop == 0)
-        fitted = ls.SOLVERS[self.solver](ls.pulled(ls.add(old, new), self.pull, self.start))
+        normal = ls.pulled(ls.add(old, new), self.pull, self.anchor)
+        fitted, tolerance = ls.SOLVERS[self.solver](normal)
+        good = tolerance >= 1 / CONDITION_LIMIT  # false for NaN
+        held = state["held"] + jnp.where(due & ~good, 1.0, 0.0)
         coefficients = tuple(
-            tuple(jnp.where(due, a, b) for a, b in zip(*rows, strict=True))
+            tuple(jnp.where(due & good, a, b) for a, b in zip(*rows, strict=True))
             for rows in zip(fitted, state["coefficients"], strict=True)
         )
         command = tuple(
@@ -164,11 +183,12 @@ class ADFC(Controller):
             "leaving": leaving,
             "target": target,
             "command": command,
+            "held": held,
         }
         decision = Decision(
             command_mm=jnp.stack(command),
             record=jnp.concatenate([seen.estimate_mm, jnp.stack(applied)]),
-            signals={"C_A": jnp.stack([jnp.stack(row) for row in coefficients])},
+            signals={"C_A": jnp.stack([jnp.stack(row) for row in coefficients]), "held": held},
         )
         return state, decision
 

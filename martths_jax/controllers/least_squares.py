@@ -66,15 +66,21 @@ def full_matrices(rows: Rows) -> tuple[jax.Array, jax.Array]:
     return G, jnp.stack([jnp.stack(row[n - j :]) for j, row in enumerate(rows)])
 
 
-def solve_ldl(rows: Rows) -> list[list[jax.Array]]:
+def solve_ldl(rows: Rows) -> tuple[list[list[jax.Array]], jax.Array]:
     """Solve G c = h by square-root-free Cholesky factorisation, unrolled.
 
     Returns:
-        c[j][side] (T,); not finite for a trial whose G is singular.
+        c[j][side] (T,), not finite for a trial whose G is singular; `tolerance` (T,), the smallest
+        pivot relative to its diagonal entry, min d_j / G_jj.  That is the share of a regressor's
+        power which those before it do not explain; its inverse is a lower bound of the condition
+        number of G scaled to a unit diagonal.  NaN or not positive for a singular G.
     """
     n = len(rows)
     work = [list(row) for row in rows]
+    tolerance = jnp.ones_like(rows[0][0])
     for j in range(n):
+        # NaN wins over any number in `minimum`, so a broken pivot stays visible.
+        tolerance = jnp.minimum(tolerance, work[j][0] / rows[j][0])
         inverse = 1.0 / work[j][0]
         scaled = [value * inverse for value in work[j]]
         for i in range(j + 1, n):
@@ -87,13 +93,15 @@ def solve_ldl(rows: Rows) -> list[list[jax.Array]]:
         for i in range(j + 1, n):
             value = [v - work[j][i - j] * c for v, c in zip(value, solution[i], strict=True)]
         solution[j] = value
-    return solution
+    return solution, tolerance
 
 
-def solve_lu(rows: Rows) -> list[list[jax.Array]]:
+def solve_lu(rows: Rows) -> tuple[list[list[jax.Array]], jax.Array]:
     """The same by ``jnp.linalg.solve`` (LU with partial pivoting): the reference, far slower."""
     G, h = (jnp.moveaxis(x, -1, 0) for x in full_matrices(rows))
-    return [list(c) for c in jnp.moveaxis(jnp.linalg.solve(G, h), 0, -1)]
+    diagonal = jnp.diagonal(jnp.linalg.cholesky(G), axis1=1, axis2=2)
+    tolerance = jnp.min(diagonal**2 / jnp.diagonal(G, axis1=1, axis2=2), axis=1)
+    return [list(c) for c in jnp.moveaxis(jnp.linalg.solve(G, h), 0, -1)], tolerance
 
 
 SOLVERS = {"ldl": solve_ldl, "lu": solve_lu}
