@@ -6,15 +6,22 @@ from collections.abc import Sequence
 
 import jax
 import numpy as np
+import psutil
 
+from martths_jax.benchmark import Benchmark
 from martths_jax.controllers import Controller
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import Motion
 from martths_jax.sensors import SensorNoise
 
+#: Numbers a sample and trial that ``keep=True`` stores, ADFC's coefficients among them.
+KEPT_NUMBERS = 36
+#: Part of the memory now free that kept signals may take.
+MEMORY_SHARE = 0.8
 
-def check_simulation(benchmark, controller, plants, motion, noise) -> None:
-    """Check the arguments of ``simulate`` against one another.
+
+def check_simulation(benchmark, controller, plants, motion, noise, keep=False, progress=None):
+    """Check the arguments of ``simulate``, each by itself and against one another.
 
     Raises:
         InputError: listing every problem.
@@ -26,73 +33,133 @@ def check_simulation(benchmark, controller, plants, motion, noise) -> None:
             problems.append(str(argument_error(name, wanted, got, remedy)))
         return good
 
-    if not hasattr(plants, "discretise"):
+    whole = expect(
+        isinstance(benchmark, Benchmark), "benchmark", "be a Benchmark", _kind(benchmark),
+        "Use build_benchmark().",
+    )  # fmt: skip
+    found = plant_problems(plants)
+    trials = None if found else len(plants)
+    problems += found
+    found = motion_problems(motion, benchmark.fs if whole else None)
+    samples = None if found else int(np.size(motion.acceleration))
+    problems += found
+    problems += noise_problems(noise, trials, samples)
+    problems += controller_problems(controller, benchmark if whole else None, trials)
+    expect(isinstance(keep, (bool, np.bool_)), "keep", "be True or False", repr(keep))
+    expect(progress is None or callable(progress), "progress", "be callable", _kind(progress))
+    if keep is True and trials and samples:
+        need, free = 8.0 * KEPT_NUMBERS * trials * samples, psutil.virtual_memory().available
         expect(
-            False, "plants", "be a batch of plants", type(plants).__name__,
-            "Use draw_plants(n, seed) or plant_from_draws(draws).",
+            need <= MEMORY_SHARE * free, "keep", f"fit into {MEMORY_SHARE * free / 2**30:.3g} GiB",
+            f"{trials} trials of {samples} samples, about {need / 2**30:.3g} GiB",
+            "Keep the signals of a few trials: simulate(..., plants[:8], ..., keep=True).",
         )  # fmt: skip
-    else:
-        expect(len(plants) > 0, "plants", "hold at least one trial", "none")
-    problems += motion_problems(motion, benchmark.fs)
-    if not problems:
-        problems += noise_problems(noise, len(plants), np.size(motion.acceleration))
-    problems += controller.problems(benchmark)
     raise_all(problems, "The simulation cannot run")
 
 
-def motion_problems(motion, fs: float) -> list[str]:
-    """Sentences about a motion that cannot be simulated at `fs`."""
-    if not isinstance(motion, Motion):
-        return [
-            str(
-                argument_error(
-                    "motion", "be a Motion", type(motion).__name__, "Use load_motion(...)."
-                )
-            )
-        ]
+def _kind(value) -> str:
+    """Type of a value, or the class itself where one forgot to call it."""
+    return f"the class {value.__name__}" if isinstance(value, type) else type(value).__name__
+
+
+def _known(value) -> bool:
+    return not isinstance(value, jax.core.Tracer)
+
+
+def plant_problems(plants) -> list[str]:
+    """Sentences about plants that cannot be simulated."""
+    if isinstance(plants, type) or not hasattr(plants, "discretise"):
+        remedy = "Use draw_plants(n, seed) or plant_from_draws(draws)."
+        return [str(argument_error("plants", "be a batch of plants", _kind(plants), remedy))]
+    if len(plants) == 0:
+        return [str(argument_error("plants", "hold at least one trial", "none"))]
     problems = []
-    if motion.fs != fs:
-        problems.append(
-            str(
-                argument_error(
-                    "motion", f"be sampled at the benchmark's {fs:g} Hz", f"{motion.fs:g} Hz",
-                    f"Load it with load_motion(..., fs={fs:g}).",
-                )
-            )
-        )  # fmt: skip
-    acceleration = motion.acceleration
-    if isinstance(acceleration, jax.core.Tracer):
-        return problems
-    if np.ndim(acceleration) != 1 or np.size(acceleration) < 2:
-        problems.append(
-            str(argument_error("motion", "have (N,) samples, N >= 2", np.shape(acceleration)))
-        )
-    elif not np.all(np.isfinite(acceleration)):
-        first = int(np.flatnonzero(~np.isfinite(acceleration))[0])
-        problems.append(
-            str(argument_error("motion", "be finite", f"{acceleration[first]} at sample {first}"))
-        )
+    if np.shape(plants.trial) != (len(plants),):
+        wanted = f"hold one trial number for each of the {len(plants)} plants"
+        problems.append(str(argument_error("plants", wanted, f"shape {np.shape(plants.trial)}")))
+    parameters = getattr(plants, "parameters_hz", None)
+    if parameters is not None and _known(parameters) and not np.all(np.isfinite(parameters)):
+        row = int(np.argwhere(~np.isfinite(np.asarray(parameters)))[0][0])
+        wanted = "have finite zeros and poles"
+        problems.append(str(argument_error("plants", wanted, f"NaN or infinity in row {row}")))
     return problems
 
 
-def noise_problems(noise, trials: int, samples: int) -> list[str]:
-    """Sentences about noise that does not fit the run."""
-    if isinstance(noise, (SensorNoise, jax.core.Tracer)):
+def motion_problems(motion, fs: float | None) -> list[str]:
+    """Sentences about a motion that cannot be simulated at `fs` (None if that is not known)."""
+    if not isinstance(motion, Motion):
+        return [
+            str(argument_error("motion", "be a Motion", _kind(motion), "Use load_motion(...)."))
+        ]
+    problems = []
+
+    def expect(good, wanted, got, remedy=""):
+        if not good:
+            problems.append(str(argument_error("motion", wanted, got, remedy)))
+        return good
+
+    if fs is not None:
+        expect(
+            motion.fs == fs, f"be sampled at the benchmark's {fs:g} Hz", f"{motion.fs:g} Hz",
+            f"Load it with load_motion(..., fs={fs:g}).",
+        )  # fmt: skip
+    acceleration = motion.acceleration
+    if not _known(acceleration):
+        return problems
+    acceleration = np.asarray(acceleration)
+    if not expect(acceleration.dtype.kind in "fiu", "hold real numbers", acceleration.dtype):
+        return problems
+    good = acceleration.ndim == 1 and acceleration.size >= 2
+    if expect(good, "have (N,) samples, N >= 2", acceleration.shape):
+        bad = np.flatnonzero(~np.isfinite(acceleration))
+        if bad.size:
+            expect(False, "be finite", f"{acceleration[bad[0]]} at sample {bad[0]}")
+    return problems
+
+
+def noise_problems(noise, trials: int | None, samples: int | None) -> list[str]:
+    """Sentences about noise that does not fit a run of so many trials and samples.
+
+    A number that is not known (None), because its argument has problems of its own, fits.
+    """
+    if noise is None or isinstance(noise, SensorNoise) or not _known(noise):
         return []
-    shape = np.shape(noise)
-    good = (len(shape) == 2 and shape[1] == 2) or (
-        len(shape) == 3 and shape[0] == trials and shape[2] == 2
-    )
-    wanted = f"be a SensorNoise or an array ({samples}, 2) or ({trials}, {samples}, 2) in mm"
-    if not good or shape[-2] < samples:
+    size = [("trials" if trials is None else trials), ("N" if samples is None else samples)]
+    wanted = f"be a SensorNoise or an array ({size[1]}, 2) or ({size[0]}, {size[1]}, 2) in mm"
+    if not isinstance(noise, (np.ndarray, jax.Array)):
+        return [str(argument_error("noise", wanted, _kind(noise)))]
+    shape = noise.shape
+    good = len(shape) in (2, 3) and shape[-1] == 2
+    good = good and (len(shape) == 2 or trials is None or shape[0] == trials)
+    if not good or (samples is not None and shape[-2] < samples):
         return [str(argument_error("noise", wanted, f"shape {shape}"))]
+    if noise.dtype.kind not in "fiu":
+        return [str(argument_error("noise", "hold real numbers", noise.dtype))]
     if not np.all(np.isfinite(noise)):
         return [str(argument_error("noise", "be finite", "NaN or infinity"))]
     return []
 
 
-def check_sequence(controllers, trials: int) -> Sequence[Controller]:
-    """A sequence of controllers, one a trial.
+def controller_problems(controller, benchmark, trials: int | None) -> list[str]:
+    """Sentences about a controller, or a sequence with one a trial, that cannot be used."""
+    if isinstance(controller, Controller):
+        return controller.problems(benchmark)
+    if isinstance(controller, type) and issubclass(controller, Controller):
+        remedy = f"Call it: {controller.__name__}(...)."
+        wanted = "be a Controller or a sequence of them"
+        return [str(argument_error("controller", wanted, _kind(controller), remedy))]
+    try:
+        check_sequence(controller, trials)
+    except InputError as error:
+        return [str(error)]
+    problems = []
+    for distinct in {id(c): c for c in controller}.values():
+        problems += [text for text in distinct.problems(benchmark) if text not in problems]
+    return problems
+
+
+def check_sequence(controllers, trials: int | None) -> Sequence[Controller]:
+    """A sequence of controllers, one a trial (any number if `trials` is None).
 
     Raises:
         InputError: if it is not one, or of the wrong length.
@@ -101,9 +168,9 @@ def check_sequence(controllers, trials: int) -> Sequence[Controller]:
         isinstance(c, Controller) for c in controllers
     ):
         raise argument_error(
-            "controller", "be a Controller or a sequence of them", type(controllers).__name__
+            "controller", "be a Controller or a sequence of them", _kind(controllers)
         )
-    if len(controllers) != trials:
+    if trials is not None and len(controllers) != trials:
         raise argument_error(
             "controller", f"be one, or one for each of the {trials} trials", len(controllers)
         )
