@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from martths_jax import __version__
-from martths_jax.cli import figures, motions, nominal, study
+from martths_jax.cli import figures, motions, nominal, study, tune
 from martths_jax.cli.console import error_console
 from martths_jax.errors import InputError
 
@@ -26,6 +26,7 @@ app.command("merge")(study.merge)
 app.command("summary")(study.summary)
 app.command("export")(study.export)
 app.command("figures")(figures.figures)
+app.command("tune")(tune.tune)
 app.add_typer(motions.app, name="motions")
 
 

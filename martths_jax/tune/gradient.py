@@ -1,0 +1,107 @@
+"""Objective and its gradient over a set of plants and motions, through every sample."""
+
+from __future__ import annotations
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.sharding import Mesh
+from jax.sharding import PartitionSpec as P
+
+from martths_jax import loop
+from martths_jax import watch as watching
+from martths_jax.benchmark import Benchmark
+from martths_jax.motions import Motion
+from martths_jax.plant import Plants
+from martths_jax.sensors import SensorNoise
+from martths_jax.simulation import draw_noise, lag_range, reference_response
+from martths_jax.tune.objective import Objective
+from martths_jax.tune.parameters import build
+from martths_jax.watch import Status
+
+
+def segment_length(samples: int, window: int) -> int:
+    """Largest divisor of the loop's window up to sqrt(samples): memory then grows like the root."""
+    longest = max(1, min(window, math.isqrt(samples)))
+    return next(n for n in range(longest, 0, -1) if window % n == 0)
+
+
+class Gradient:
+    """Mean objective over plants and motions, as a function of the log-numbers.
+
+    Args:
+        benchmark, controller: what is tuned; the name of the controller.
+        objective: what counts.
+        plants: T plants; they are split over the devices if their number allows it.
+        motions: at the benchmark's rate; each length is compiled once.
+        noise: sensor noise.
+    """
+
+    def __init__(
+        self,
+        benchmark: Benchmark,
+        controller: str,
+        objective: Objective,
+        plants: Plants,
+        motions: list[Motion],
+        noise: SensorNoise | None = None,
+    ):
+        self.objective, self.plants = objective, plants
+        fs = benchmark.fs
+        trials = len(plants)
+        devices = jax.local_devices()[: math.gcd(trials, jax.local_device_count())]
+        lags = lag_range(0, fs) if objective.needs_delays else (1, 1)
+
+        def value(logs, plants, ground, reference, noise):
+            ready = build(controller, benchmark, logs)
+            sums, watch, _, peaks = loop.run(
+                benchmark,
+                ready,
+                plants.discretise(benchmark.dt),
+                ground,
+                reference,
+                noise,
+                trials=plants.draws.shape[0],
+                lags=lags,
+                segment=segment_length(ground.shape[0], ready.window or loop.WINDOW),
+                tally=objective.tally,
+            )
+            loss, smooth = objective.evaluate(sums, watch, peaks)
+            lost = watching.status_of(watch) >= Status.DIVERGED
+            return jnp.mean(loss), (jax.tree.map(jnp.mean, smooth), jnp.mean(lost.astype(float)))
+
+        def local(*arguments):
+            outcome = jax.value_and_grad(value, has_aux=True)(*arguments)
+            return jax.tree.map(lambda x: x[None], outcome)
+
+        sharded = jax.shard_map(
+            local,
+            mesh=Mesh(np.array(devices), ("trials",)),
+            in_specs=(
+                P(),
+                jax.tree.map(lambda x: P("trials") if jnp.ndim(x) else P(), plants),
+                P(),
+                P(),
+                P(None, None, "trials"),
+            ),
+            out_specs=P("trials"),
+            check_vma=False,
+        )
+        self.program = jax.jit(sharded)
+        noise = noise or SensorNoise()
+        self.inputs = []
+        for motion in motions:
+            ground = jnp.asarray(motion.acceleration)
+            reference = reference_response(benchmark, ground)
+            drawn = draw_noise(noise, jnp.asarray(plants.trial), ground.shape[0], fs)
+            self.inputs.append((ground, reference, drawn))
+
+    def __call__(self, logs) -> tuple[float, dict[str, float], dict[str, float], float]:
+        """At log-numbers: objective, gradient, smooth indices, share of trials that diverged."""
+        logs = {name: jnp.asarray(value, dtype=float) for name, value in logs.items()}
+        outcomes = [self.program(logs, self.plants, *each) for each in self.inputs]
+        mean = lambda *x: float(np.mean([np.mean(np.asarray(v)) for v in x]))  # noqa: E731
+        (loss, (smooth, lost)), slope = jax.tree.map(mean, *outcomes)
+        return loss, slope, smooth, lost

@@ -1,0 +1,132 @@
+"""What tuning minimises: a weighted sum of indices, each in a form that has a useful gradient.
+
+RMS indices (J2, J5, J7, J8) are smooth as they are.  Two kinds are replaced:
+
+* delays J1, J4, which are whole samples, by the vertex of the parabola through the largest
+  cross-correlation and its neighbours;
+* peaks J3, J6, J9, J10, 100 max|e| / max|t|, by 100 |e|_p / |t|_p with the p-norm over time,
+  p = 16: for p = 2 that is the RMS index, for p to infinity the peak index.
+
+The final numbers of a tuning are always the true indices.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+
+from martths_jax.benchmark import VOLT_LIMIT
+from martths_jax.errors import argument_error
+from martths_jax.indices import DELAYS, NAMES, PAIRS, IndexSums, indices_of, pairs
+from martths_jax.watch import Watch
+
+DOUBLINGS_OF_POWER = 4
+POWER = 2**DOUBLINGS_OF_POWER
+PEAKS = tuple(peak for _, peak in PAIRS)
+
+
+class PeakTally:
+    """Sums of |error|^p and |target|^p of the ten pairs, (10, T) each, for ``loop.run``."""
+
+    def init(self, trials: int):
+        """Empty sums."""
+        return (jnp.zeros((len(PAIRS), trials)),) * 2
+
+    def add(self, sums, signals, reference, valid):
+        """Add a sample; arguments as ``indices.pairs`` takes them, and whether it counts."""
+        found = pairs(signals, reference)
+        error = jnp.concatenate([value - target for value, target in found])
+        target = jnp.concatenate([target for _, target in found])
+        return tuple(
+            total + _power(jnp.where(valid, x, 0.0))
+            for total, x in zip(sums, (error, target), strict=True)
+        )
+
+
+def _power(x):
+    for _ in range(DOUBLINGS_OF_POWER):
+        x = x * x
+    return x
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Weighted sum of indices and a penalty on volts.
+
+    Attributes:
+        terms: (weight, index name) pairs.
+        volt_limit: valve command above which the penalty starts [V].
+        penalty: its weight on (peak - volt_limit)^2 summed over the valves [1/V^2].
+    """
+
+    terms: tuple[tuple[float, str], ...]
+    volt_limit: float = VOLT_LIMIT
+    penalty: float = 10.0
+
+    @classmethod
+    def parse(cls, text: str, volt_limit: float = VOLT_LIMIT, penalty: float = 10.0) -> Objective:
+        """Objective from a sum such as ``j2 + 0.5*j5 + J8_26``.
+
+        A group (``j2``) stands for the mean of its indices.
+
+        Raises:
+            InputError: for an unknown index, a weight or penalty that is not positive, or no term.
+        """
+        terms = []
+        for part in text.split("+"):
+            match = re.fullmatch(r"\s*(?:([^*\s]+)\s*\*)?\s*([A-Za-z0-9_]+)\s*", part)
+            named = match and match[2].upper()
+            group = [n for n in NAMES if n == named or n.split("_")[0] == named]
+            if not group:
+                raise argument_error(
+                    "objective",
+                    "be a sum of weighted indices such as j2+0.5*j5",
+                    repr(part.strip()),
+                    "The groups are J1 to J10, the indices " + ", ".join(NAMES) + ".",
+                )
+            weight = _positive("objective", match[1] or "1", f"have a positive weight on {named}")
+            terms += [(weight / len(group), name) for name in group]
+        limit = _positive("volts", volt_limit, "be a positive limit (V)")
+        weight = float(penalty)
+        if not 0 <= weight < float("inf"):
+            raise argument_error("penalty", "be zero or positive", penalty)
+        return cls(tuple(terms), limit, weight)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The indices that count, each once."""
+        return tuple(dict.fromkeys(name for _, name in self.terms))
+
+    @property
+    def tally(self) -> PeakTally | None:
+        """The running sums it needs besides those of every run."""
+        return PeakTally() if set(self.names) & set(PEAKS) else None
+
+    @property
+    def needs_delays(self) -> bool:
+        """Whether cross-correlations are needed."""
+        return bool(set(self.names) & set(DELAYS))
+
+    def evaluate(self, sums: IndexSums, watch: Watch, peaks) -> tuple[jax.Array, dict]:
+        """Smooth objective of each trial (T,) and the smooth indices it is made of (T,)."""
+        smooth = indices_of(sums, interpolate=True)
+        if peaks is not None:
+            error, target = (jnp.maximum(x, 1e-300) ** (1 / POWER) for x in peaks)
+            smooth |= dict(zip(PEAKS, 100 * error / target, strict=True))
+        smooth = {name: smooth[name] for name in self.names}
+        over = jnp.maximum(watch.volt_peak - self.volt_limit, 0.0)
+        loss = sum(weight * jnp.abs(smooth[name]) for weight, name in self.terms)
+        return loss + self.penalty * jnp.sum(over**2, axis=0), smooth
+
+
+def _positive(name, value, wanted) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = float("nan")
+    if not 0 < number < float("inf"):
+        raise argument_error(name, wanted, value)
+    return number

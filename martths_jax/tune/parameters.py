@@ -1,0 +1,65 @@
+"""What can be tuned: log10 of a controller's positive numbers, and the controller they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+
+from martths_jax.benchmark import Benchmark
+from martths_jax.controllers import ADFC, LQG, Controller
+from martths_jax.design.lqg import WEIGHTS, kalman_gain, lqg_from_weights
+from martths_jax.errors import argument_error
+from martths_jax.kalman import KalmanFilter
+
+#: Controller -> its tunable numbers: LQG's weights or ADFC's pull lambda, and the filter's q.
+TUNABLE = {"lqg": WEIGHTS, "adfc": ("pull", "q")}
+
+
+def start_of(controller: str, given: Mapping[str, float] | None = None) -> dict[str, float]:
+    """log10 of the numbers that tuning starts from: the defaults, and what is given instead.
+
+    Raises:
+        InputError: for an unknown controller or number, or a value that is not positive.
+    """
+    if controller not in TUNABLE:
+        raise argument_error("controller", f"be one of {sorted(TUNABLE)}", repr(controller))
+    if controller == "lqg":
+        d = LQG.design.__func__.__kwdefaults__
+        values = dict(e1=d["e"][0], e2=d["e"][1], r2=d["r"][1] / d["r"][0], y1=d["y"][0])
+        values |= dict(y2=d["y"][1], q=d["q"])
+    else:
+        values = {"pull": ADFC().pull, "q": ADFC().q}
+    for name, value in (given or {}).items():
+        if name not in values:
+            raise argument_error("start", f"name one of {', '.join(values)}", repr(name))
+        if not 0 < value < float("inf"):
+            raise argument_error("start", f"give a positive {name}", value)
+        values[name] = value
+    return {name: float(np.log10(value)) for name, value in values.items()}
+
+
+def build(controller: str, benchmark: Benchmark, logs: Mapping) -> Controller:
+    """Prepared controller from log10 of its numbers, which may be traced."""
+    if controller == "lqg":
+        return lqg_from_weights(benchmark, logs)
+    prepared = ADFC().prepare(benchmark)
+    gain = kalman_gain(benchmark, 10.0 ** jnp.asarray(logs["q"]))
+    return replace(
+        prepared,
+        pull=10.0 ** jnp.asarray(logs["pull"]),
+        q=10.0 ** jnp.asarray(logs["q"]),
+        estimator=KalmanFilter(prepared.estimator.model, gain),
+    )
+
+
+def host_controller(controller: str, benchmark: Benchmark, logs: Mapping[str, float]) -> Controller:
+    """The same by the package's ordinary, checked constructors."""
+    w = {name: 10.0 ** float(value) for name, value in logs.items()}
+    if controller == "lqg":
+        return LQG.design(
+            benchmark, e=(w["e1"], w["e2"]), r=(1.0, w["r2"]), y=(w["y1"], w["y2"]), q=w["q"]
+        )
+    return ADFC(pull=w["pull"], q=w["q"])

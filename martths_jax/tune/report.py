@@ -1,0 +1,101 @@
+"""What a tuning leaves behind: design, history, convergence plot, and a check on fresh trials."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from martths_jax.benchmark import Benchmark
+from martths_jax.indices import NAMES, indices
+from martths_jax.motions import Motion
+from martths_jax.plant import draw_plants
+from martths_jax.published import ADFC, LQG, TABLE4
+from martths_jax.sensors import SensorNoise
+from martths_jax.simulation import simulate
+from martths_jax.tune.parameters import host_controller
+
+FRESH = 1_000_001  # first trial number of the fresh plants; tuning starts at 1
+
+
+def write_report(
+    benchmark: Benchmark, controller: str, state: dict, check: Motion, plants: int, folder: Path
+) -> list[dict]:
+    """Write design.json, history.csv, convergence.png and comparison.csv into `folder`.
+
+    Args:
+        state: from ``tune``.
+        check: a motion that was not tuned on.
+        plants: number of fresh plants.
+
+    Returns:
+        rows of the comparison: index, medians with the start and the tuned numbers by the true
+        indices, and what the paper prints (other motions, nominal plant).  The last two rows are
+        the share of trials that diverged and the largest valve command [V].
+    """
+    design = {name: 10.0**value for name, value in state["best"].items()}
+    report = {"controller": controller, "ended": state["ended"] or "all steps done", **design}
+    (folder / "design.json").write_text(json.dumps(report, indent=1) + "\n")
+    _write_csv(folder / "history.csv", state["history"])
+    _plot(state["history"], folder / "convergence.png")
+    rows = compare(benchmark, controller, state, check, plants)
+    _write_csv(folder / "comparison.csv", rows)
+    return rows
+
+
+def compare(benchmark, controller, state, check: Motion, plants: int) -> list[dict]:
+    """Start against tuned on fresh plants and an unseen motion; see ``write_report``."""
+    seed = state["setting"]["seed"]
+    fresh = draw_plants(plants, seed, first=FRESH)
+    column = {"lqg": LQG, "adfc": ADFC}[controller]
+    medians = {}
+    for name in ("start", "best"):
+        ready = host_controller(controller, benchmark, state[name])
+        result = simulate(benchmark, ready, fresh, check, SensorNoise(seed=seed))
+        found = indices(result)
+        kept = ~result.lost
+        medians[name] = {
+            n: float(np.median(found[n][kept])) if kept.any() else np.nan for n in NAMES
+        }
+        medians[name]["diverged [%]"] = 100 * float(np.mean(result.lost))
+        medians[name]["largest volts"] = float(np.max(result.watch.volt_peak))
+    return [
+        {
+            "index": n,
+            "start": medians["start"][n],
+            "tuned": medians["best"][n],
+            "published": TABLE4[n][column] if n in TABLE4 else "",
+        }
+        for n in medians["start"]
+    ]
+
+
+def _write_csv(path: Path, rows: list[dict]) -> None:
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _plot(history: list[dict], path: Path) -> None:
+    """Objective over steps, refused ones marked, and the numbers below."""
+    figure, (top, bottom) = plt.subplots(
+        2, 1, sharex=True, figsize=(6.5, 5.5), layout="constrained"
+    )
+    good = [row for row in history if row["accepted"]]
+    top.plot([r["step"] for r in good], [r["objective"] for r in good], ".-")
+    for row in history:
+        if not row["accepted"]:
+            top.axvline(row["step"], color="0.8", zorder=0)
+    top.set_ylabel("objective")
+    for name in (n for n in history[0] if n.startswith("log10_")):
+        steps, values = [r["step"] for r in good], [r[name] - good[0][name] for r in good]
+        bottom.plot(steps, values, label=name[6:])
+    bottom.set_xlabel("step")
+    bottom.set_ylabel("change of log10")
+    bottom.legend(ncols=3, fontsize="small")
+    figure.savefig(path, dpi=150)
+    plt.close(figure)

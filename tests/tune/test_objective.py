@@ -1,0 +1,66 @@
+"""Objectives: what is understood, what is refused, and how near the smooth peaks are."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from martths_jax import InputError
+from martths_jax.tune import Objective, Options
+from martths_jax.tune.gradient import segment_length
+from martths_jax.tune.objective import POWER, PeakTally
+
+
+def test_a_group_is_the_mean_of_its_indices():
+    terms = Objective.parse("j2 + 0.5*J8_26").terms
+    assert terms == ((0.5, "J2_1"), (0.5, "J2_2"), (0.5, "J8_26"))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"objective": "j2+j11"}, "'j11'"),
+        ({"objective": "-1*j2"}, "positive weight on J2"),
+        ({"objective": ""}, "weighted indices"),
+        ({"start": (("e1", -1.0),)}, "positive e1"),
+        ({"start": (("lambda", 1.0),)}, "'lambda'"),
+        ({"plants": 0}, "plants"),
+        ({"controller": "pid"}, "'pid'"),
+        ({"free": ("e3",)}, "e3"),
+        ({"rate": 0.0}, "rate"),
+        ({"volts": -1.0}, "volts"),
+    ],
+)
+def test_bad_options_are_one_sentence(changes, words):
+    options = Options(**({"controller": "lqg", "objective": "j2"} | changes))
+    with pytest.raises(InputError, match=words):
+        options.check()
+
+
+def test_peak_tally_is_the_p_norm_over_valid_samples():
+    rng = np.random.default_rng(0)
+    signals = {
+        "x_a": rng.normal(size=(50, 2, 1)),
+        "x_m": rng.normal(size=(50, 2, 1)),
+        "num": rng.normal(size=(50, 6, 1)),
+        "est": rng.normal(size=(50, 2, 1)),
+    }
+    tally, reference = PeakTally(), rng.normal(size=(50, 6, 1))
+    sums = tally.init(1)
+    for k in range(50):
+        now = {name: jnp.asarray(x[k]) for name, x in signals.items()}
+        sums = tally.add(sums, now, jnp.asarray(reference[k]), k < 40)
+    error = np.abs(signals["x_m"] - signals["x_a"])[:40, 1, 0]
+    assert float(sums[0][1, 0]) ** (1 / POWER) == pytest.approx(
+        np.linalg.norm(error, POWER), rel=1e-12
+    )
+    target = np.abs(reference[:40, 5, 0])
+    assert float(sums[1][9, 0]) ** (1 / POWER) == pytest.approx(
+        np.linalg.norm(target, POWER), rel=1e-12
+    )
+
+
+def test_segments_divide_the_window_and_grow_like_the_root():
+    assert segment_length(42_000, 1024) == 128
+    assert segment_length(2_000_000, 1024) == 1024
+    assert segment_length(42_000, 1000) == 200
+    assert segment_length(42_000, 1021) == 1

@@ -1,0 +1,120 @@
+"""Gradients of whole runs, and the descent on a short motion."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from martths_jax import ADFC, LQG, InputError, build_benchmark, draw_plants, load_motion, loop
+from martths_jax.sensors import SensorNoise
+from martths_jax.simulation import reference_response
+from martths_jax.tune import Options, tune
+from martths_jax.tune import search as searching
+from martths_jax.tune.objective import Objective
+
+
+@pytest.fixture(scope="module")
+def benchmark():
+    return build_benchmark()
+
+
+@pytest.fixture(scope="module")
+def motion():
+    whole = load_motion("elcentro-like", scale=0.4, fs=1024)
+    return replace(whole, acceleration=whole.acceleration[2048:4096])
+
+
+@pytest.mark.parametrize("kind", ["lqg", "adfc"])
+def test_gradient_through_checkpointed_segments(benchmark, motion, kind):
+    """Reverse mode against finite differences and forward mode, over three windows."""
+    objective = Objective.parse("j2+j3+j5+j1")
+    plants = draw_plants(2, seed=3)
+    ground = jnp.asarray(motion.acceleration)
+    reference = reference_response(benchmark, ground)
+    noise = SensorNoise().draw(plants.trial, ground.size, benchmark.fs)
+    base = (LQG.design(benchmark) if kind == "lqg" else ADFC(nb=640, no=639)).prepare(benchmark)
+
+    def value(x, segment):
+        gain = base.estimator.filter_gain * (1 + x[1])
+        changed = replace(base, estimator=replace(base.estimator, filter_gain=gain))
+        if kind == "lqg":
+            changed = replace(changed, K_z=base.K_z * (1 + x[0]))
+        else:
+            changed = replace(changed, pull=base.pull * jnp.exp(x[0]))
+        sums, watch, _, peaks = loop.run(
+            benchmark, changed, plants.discretise(benchmark.dt), ground, reference, noise,
+            trials=2, lags=(6, 13), segment=segment, tally=objective.tally,
+        )  # fmt: skip
+        return jnp.mean(objective.evaluate(sums, watch, peaks)[0])
+
+    points = 1e-5 * jnp.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    plain = jax.jit(lambda x: value(x, 0))
+    at = [float(plain(x)) for x in points]
+    slope = [(at[1] - at[2]) / 2e-5, (at[3] - at[4]) / 2e-5]
+    result, reverse = jax.jit(jax.value_and_grad(lambda x: value(x, 32)))(points[0])
+    assert float(result) == pytest.approx(at[0], rel=1e-10)
+    np.testing.assert_allclose(reverse, slope, rtol=1e-4)
+    forward = jax.jit(lambda x, d: jax.jvp(lambda y: value(y, 0), (x,), (d,))[1])
+    both = forward(points[0], jnp.array([1.0, 1.0]))
+    assert float(both) == pytest.approx(float(jnp.sum(reverse)), rel=1e-7)
+
+
+class Bowl:
+    """In place of the simulation: a quadratic objective, unstable beyond a wall."""
+
+    wall = np.inf
+
+    def __init__(self, *_):
+        pass
+
+    def __call__(self, logs):
+        x = {name: float(value) for name, value in logs.items()}
+        lost = float(x["pull"] > self.wall)
+        slope = {"pull": 2 * (x["pull"] + 3), "q": 2 * (x["q"] + 4)}
+        loss = (x["pull"] + 3) ** 2 + (x["q"] + 4) ** 2
+        return (np.nan if lost else loss), slope, {"J2_1": loss}, lost
+
+
+@pytest.fixture
+def bowl(monkeypatch):
+    monkeypatch.setattr(searching, "Gradient", Bowl)
+    monkeypatch.setattr(Bowl, "wall", np.inf)
+    return Options("adfc", "j2", plants=1, steps=60, rate=0.2, start=(("pull", 1e-5), ("q", 1e-3)))
+
+
+def test_descent_finds_the_minimum_and_stops_early(bowl, tmp_path):
+    state = tune(None, replace(bowl, steps=400), [], tmp_path)
+    assert state["best"]["pull"] == pytest.approx(-3, abs=0.05)
+    assert state["best"]["q"] == pytest.approx(-4, abs=0.05)
+    assert state["ended"] and len(state["history"]) < 400
+
+
+def test_interrupted_tuning_goes_on_as_if_nothing_had_happened(bowl, tmp_path):
+    whole = tune(None, bowl, [], tmp_path / "whole")
+    tune(None, replace(bowl, steps=7), [], tmp_path / "parts")
+    parts = tune(None, bowl, [], tmp_path / "parts")
+    assert parts["history"] == whole["history"]
+    with pytest.raises(InputError, match="other options"):
+        tune(None, replace(bowl, seed=2), [], tmp_path / "parts")
+
+
+def test_unstable_steps_are_backed_off(bowl, tmp_path, monkeypatch):
+    monkeypatch.setattr(Bowl, "wall", -4.0)
+    state = tune(None, bowl, [], tmp_path)
+    refused = [row for row in state["history"] if not row["accepted"]]
+    assert refused and state["best"]["pull"] <= -4.0
+    assert state["best"]["pull"] > -4.2
+    assert np.all(np.isfinite([r["objective"] for r in state["history"] if r["accepted"]]))
+
+
+def test_unstable_start_is_refused(bowl, tmp_path, monkeypatch):
+    monkeypatch.setattr(Bowl, "wall", -6.0)
+    with pytest.raises(InputError, match="start"):
+        tune(None, bowl, [], tmp_path)
+
+
+def test_only_free_numbers_move(bowl, tmp_path):
+    state = tune(None, replace(bowl, free=("q",)), [], tmp_path)
+    assert state["best"]["pull"] == -5 and state["best"]["q"] < -3.5
