@@ -35,6 +35,11 @@ TAPS = BACKWARD_DIFFERENCES.shape[1]
 #: Coefficients that do nothing: u follows x_a.
 FOLLOW_TARGET = np.zeros((8, 2))
 FOLLOW_TARGET[0, 0] = FOLLOW_TARGET[4, 1] = 1.0
+#: Pull towards the inverse plant that keeps every trial (docs/guarded_adfc.md has the evidence)
+#: [mm^2].
+GUARD_PULL = 6e-5
+#: What a fit can be pulled towards.
+ANCHORS = ("start", "inverse")
 #: A fit whose normal matrix is worse conditioned is not used (the paper's bound).
 CONDITION_LIMIT = 1e14
 
@@ -47,13 +52,15 @@ class ADFC(Controller):
     Attributes:
         nb: buffer length N_b, rows in the fit.
         no: overlap N_o of successive fits; a new C_A comes every N_b - N_o samples.
-        pull: weight lambda of the pull towards `anchor`, added to the normal matrix in scaled
-            derivatives [mm^2]; 0 is the paper's literal least squares.  See docs/guarded_adfc.md
-            for the evidence behind the default.
+        pull: weight lambda of the pull towards given coefficients, added to the normal matrix in
+            scaled derivatives [mm^2]; 0 is the paper's literal least squares.  None, the default,
+            is the guarded controller: ``GUARD_PULL`` towards the inverse of the nominal plant, see
+            docs/guarded_adfc.md.
         q: process noise of the Kalman filter [mm^2].
         start: (8, 2) coefficients C_0 until the buffer is full; None follows the target (u = x_a).
-        anchor: (8, 2) coefficients that the fit is pulled to; None is the inverse of the nominal
-            plant (``nominal_inverse``).
+        towards: what `pull` pulls to: ``start``, or ``inverse``, the inverse of the nominal plant
+            (``nominal_inverse``); None is ``start`` if a pull is given, else ``inverse``.
+        anchor: (8, 2) coefficients of one's own to pull to, instead of those.
         solver: ``ldl`` (unrolled, fast) or ``lu`` (``jnp.linalg.solve``, the reference).
         estimator: the Kalman filter, designed by ``prepare``.
 
@@ -64,9 +71,10 @@ class ADFC(Controller):
 
     nb: int = field(default=1024, metadata={"static": True})
     no: jax.Array | int = 1023
-    pull: jax.Array | float = 6e-5
+    pull: jax.Array | float | None = None
     q: jax.Array | float = 3e-5
     start: jax.Array | None = None
+    towards: str | None = field(default=None, metadata={"static": True})
     anchor: jax.Array | None = None
     solver: str = field(default="ldl", metadata={"static": True})
     estimator: Any = None
@@ -74,7 +82,7 @@ class ADFC(Controller):
     name = "adfc"
 
     def __post_init__(self):
-        numbers = (self.no, self.pull, self.q)
+        numbers = (self.no, 0 if self.pull is None else self.pull, self.q)
         if all(type(x) in (int, float) for x in numbers):  # not when JAX rebuilds it from leaves
             raise_all(self.problems(None), "The controller cannot be used")
 
@@ -91,7 +99,8 @@ class ADFC(Controller):
 
         def known(value):
             # A traced value has none yet; it is the caller's to keep in range.
-            return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
+            given = value is not None and not isinstance(value, jax.core.Tracer)
+            return np.asarray(value) if given else None
 
         nb, no, pull, q = self.nb, known(self.no), known(self.pull), known(self.q)
         whole = isinstance(nb, (int, np.integer))
@@ -103,10 +112,11 @@ class ADFC(Controller):
             expect(good, "pull", "be zero or positive (mm^2)", pull)
         if q is not None:
             expect(np.all(np.isfinite(q) & (q > 0)), "q", "be positive (mm^2)", q)
+        expect(self.towards in (None, *ANCHORS), "towards", f"be one of {ANCHORS}", self.towards)
         expect(self.solver in ls.SOLVERS, "solver", f"be one of {sorted(ls.SOLVERS)}", self.solver)
         for name in ("start", "anchor"):
             value = known(getattr(self, name))
-            if value is None or value.dtype == object:  # not given, or traced
+            if value is None or value.dtype == object:
                 continue
             good = value.shape[:2] == (8, 2) and value.ndim in (2, 3)
             expect(good, name, "be (8, 2)", f"shape {value.shape}")
@@ -115,13 +125,16 @@ class ADFC(Controller):
 
     def prepare(self, benchmark):
         start = FOLLOW_TARGET if self.start is None else self.start
+        towards = self.towards or ("inverse" if self.pull is None else "start")
         anchor = self.anchor
-        if anchor is None:
+        if anchor is None and towards == "start":
+            anchor = start
+        elif anchor is None:
             anchor = nominal_inverse(benchmark.plant_model, benchmark.fs, BACKWARD_DIFFERENCES)
         return replace(
             self,
             no=jnp.asarray(self.no),
-            pull=jnp.asarray(self.pull, dtype=float),
+            pull=jnp.asarray(GUARD_PULL if self.pull is None else self.pull, dtype=float),
             start=jnp.asarray(start, dtype=float),
             anchor=jnp.asarray(anchor, dtype=float),
             estimator=design_kalman(benchmark.plant_model, self.q, benchmark.r_mm2),

@@ -10,11 +10,13 @@ import numpy as np
 
 from martths_jax.benchmark import Benchmark
 from martths_jax.controllers import ADFC, LQG, Controller
+from martths_jax.controllers.adfc import GUARD_PULL
 from martths_jax.design.lqg import WEIGHTS, kalman_gain, lqg_from_weights
 from martths_jax.errors import argument_error
 from martths_jax.kalman import KalmanFilter
 
-#: Controller -> its tunable numbers: LQG's weights or ADFC's pull lambda, and the filter's q.
+#: Controller -> its tunable numbers: LQG's weights, or ADFC's pull towards the inverse plant, and
+#: the filter's q.
 TUNABLE = {"lqg": WEIGHTS, "adfc": ("pull", "q")}
 
 
@@ -31,7 +33,7 @@ def start_of(controller: str, given: Mapping[str, float] | None = None) -> dict[
         values = dict(e1=d["e"][0], e2=d["e"][1], r2=d["r"][1] / d["r"][0], y1=d["y"][0])
         values |= dict(y2=d["y"][1], q=d["q"])
     else:
-        values = {"pull": ADFC().pull, "q": ADFC().q}
+        values = {"pull": GUARD_PULL, "q": ADFC().q}
     for name, value in (given or {}).items():
         if name not in values:
             raise argument_error("start", f"name one of {', '.join(values)}", repr(name))
@@ -62,4 +64,4 @@ def host_controller(controller: str, benchmark: Benchmark, logs: Mapping[str, fl
         return LQG.design(
             benchmark, e=(w["e1"], w["e2"]), r=(1.0, w["r2"]), y=(w["y1"], w["y2"]), q=w["q"]
         )
-    return ADFC(pull=w["pull"], q=w["q"])
+    return ADFC(pull=w["pull"], towards="inverse", q=w["q"])

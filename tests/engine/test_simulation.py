@@ -26,7 +26,6 @@ from martths_jax import (
     nominal_plant,
     simulate,
 )
-from martths_jax.controllers.adfc import FOLLOW_TARGET
 from martths_jax.indices import NAMES, PAIRS
 from martths_jax.kalman import DirectMeasurement
 from tests.engine.motions import burst
@@ -44,7 +43,7 @@ def controllers(benchmark):
             y=(10**2.836, 10**0.921),
             q=10**-1.82,
         ),
-        "adfc": ADFC(pull=1e-6, q=1e-5, anchor=FOLLOW_TARGET),
+        "adfc": ADFC(pull=1e-6, q=1e-5),
     }
 
 

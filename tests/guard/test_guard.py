@@ -79,7 +79,7 @@ def test_a_singular_fit_keeps_the_last_good_coefficients(benchmark):
     assert result.status[0] == Status.OK
     assert result.describe(0) == f"Trial 0 ok: {due} fits not used"
 
-    pulled = replace(literal, pull=1e-5)
+    pulled = replace(literal, pull=1e-5, towards="inverse")
     result = simulate(benchmark, pulled, nominal_plant(), still, quiet, keep=True)
     assert result.watch.held.tolist() == [0]
     anchor = nominal_inverse(benchmark.plant_model, benchmark.fs, BACKWARD_DIFFERENCES)
