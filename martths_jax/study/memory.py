@@ -12,7 +12,7 @@ MOST_BLOCKS = 16
 #: Noise of a block as drawn, shortened and in the loop's windows, while the next one is drawn.
 COPIES = 4
 #: A chunk's noise is kept below this, however much memory is free [bytes].
-ENOUGH = 1.5e9
+ENOUGH = 0.5e9
 
 
 def lane_bytes(samples: int, channels: int) -> int:
