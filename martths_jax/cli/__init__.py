@@ -27,6 +27,9 @@ app.command("summary")(study.summary)
 app.command("export")(study.export)
 app.command("figures")(figures.figures)
 app.command("tune")(tune.tune)
+app.command("table")(figures.table)
+app.command("report")(figures.report)
+app.command("replay")(figures.replay)
 app.add_typer(motions.app, name="motions")
 
 

@@ -44,7 +44,8 @@ def paired(source: Source) -> Drawing:
             found = compare(first, second)
             size = float(np.nanmedian(np.abs(second))) if np.isfinite(second).any() else np.nan
             d, w = found.difference, found.wins
-            bars.append(100 * np.array([d.low, d.value, d.high]) / size)
+            # Where the second one's median is zero, as a delay's can be, there is no percentage.
+            bars.append(100 * np.array([d.low, d.value, d.high]) / (size or np.nan))
             wins.append(100 * np.array([w.low, w.value, w.high]))
             row = (motion, name, d.value, d.low, d.high, size, w.value, w.low, w.high, found.ties,
                    w.trials)  # fmt: skip

@@ -1,0 +1,132 @@
+"""The report: one HTML file that needs no network and opens from the disk."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Callable, Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from martths_jax.figures import drawings, open_source
+from martths_jax.files import atomic
+from martths_jax.report.payload import history_payload, trial_payload
+from martths_jax.report.tables import study_tables
+from martths_jax.study import Study
+from martths_jax.study.runner import read_provenance
+from martths_jax.study.summary import Table, summarise
+
+#: Resolution of the figures in the page.
+DPI = 130
+
+
+def write_report(
+    folder: Path | str,
+    out: Path | str | None = None,
+    *,
+    trial: int = 0,
+    only: Sequence[str] = (),
+    progress: Callable[[str], None] = lambda name: None,
+) -> Path:
+    """Write the report of a study.
+
+    Args:
+        folder: of a finished study.
+        out: file to write; ``report.html`` in the folder if None.
+        trial: whose histories the figures draw.
+        only: beginnings of the names of the figures wanted; all if empty.
+        progress: told the name of every figure drawn.
+
+    Returns:
+        path of the file.
+
+    Raises:
+        InputError: no such study, trial or figure, or the file cannot be written.
+    """
+    source = open_source(folder, trial)
+    out = Path(folder) / "report.html" if out is None else Path(out)
+    pictures = []
+    for name, drawing in drawings(source, only):
+        pictures.append(_picture(name, drawing))
+        progress(name)
+    text = compose(source.study, "\n".join(pictures))
+    with atomic(out) as part:
+        part.write_text(text, encoding="utf-8")
+    return out
+
+
+def compose(study: Study, pictures: str) -> str:
+    """The page's text from a study and its figures as HTML."""
+    from plotly.offline import get_plotlyjs
+
+    summary = summarise(study.dataset)
+    data = trial_payload(study) | {"histories": history_payload(study), "folder": str(study.folder)}
+    paired = [t for t in summary.tables if " versus " in t.title]
+    tables = [*study_tables(study.dataset), *paired]
+    parts = {
+        "TITLE": escape(summary.heading),
+        "STYLE": _own("style.css"),
+        "ENDS": _html_table(summary.tables[0], fold=False),
+        "TABLES": "\n".join(_html_table(t, fold=i > 0) for i, t in enumerate(tables)),
+        "FIGURES": pictures,
+        "PROVENANCE": _provenance(study),
+        "PLOTLY": get_plotlyjs(),
+        # A closing tag inside the data would end the script element.
+        "DATA": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
+        "SCRIPT": _own("app.js"),
+    }
+    pieces = _own("page.html").split("%%")
+    return "".join(parts[piece] if i % 2 else piece for i, piece in enumerate(pieces))
+
+
+def _own(name: str) -> str:
+    return files("martths_jax.report").joinpath(name).read_text("utf-8")
+
+
+def _picture(name: str, drawing) -> str:
+    buffer = io.BytesIO()
+    drawing.figure.savefig(buffer, format="png", dpi=DPI)
+    data = base64.b64encode(buffer.getvalue()).decode()
+    caption = escape(drawing.caption)
+    return (
+        f'<figure id="{escape(name)}"><img alt="{caption}" src="data:image/png;base64,{data}">'
+        f"<figcaption>{caption}</figcaption></figure>"
+    )
+
+
+def _html_table(table: Table, fold: bool) -> str:
+    head = "".join(f"<th>{escape(c)}</th>" for c in table.columns)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in table.rows
+    )
+    notes = "".join(f"<p class=note>{escape(n)}</p>" for n in table.notes)
+    opened = "" if fold else " open"
+    return (
+        f"<details{opened}><summary>{escape(table.title)}</summary><div class=wide><table>"
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>{notes}</details>"
+    )
+
+
+def _provenance(study: Study) -> str:
+    """Versions, commit, configuration, seed, checksums and machines as a list."""
+    found = study.dataset.attrs
+    texts = {k: str(np.ravel(v)[0]) for k, v in found.items()}
+    rows = [
+        (k, v) for k, v in texts.items() if k not in ("configuration", "identity", "Conventions")
+    ]
+    rows.append(("configuration", _indented(texts["configuration"])))
+    for i, session in enumerate(read_provenance(study.folder)["sessions"], 1):
+        rows.append((f"session {i}", ", ".join(f"{k}: {v}" for k, v in session.items())))
+    items = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in rows)
+    return f"<dl>{items}</dl>"
+
+
+def _indented(text: str) -> str:
+    try:
+        return json.dumps(json.loads(text), indent=1)
+    except ValueError:  # a very long configuration is stored shortened
+        return text

@@ -1,0 +1,167 @@
+"""Table 4 with our columns beside the published ones, and percentiles over the uncertain plants."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from martths_jax import published
+from martths_jax.errors import argument_error
+from martths_jax.figures.style import controller_label, index_label, motion_label
+from martths_jax.indices import DELAYS, NAMES
+from martths_jax.study.statistics import PERCENTS, percentile
+from martths_jax.study.summary import Table, number
+
+FORMATS = ("md", "tex", "csv")
+#: Published columns of Table 4 by the controller they are to be compared with.
+PUBLISHED = {"lqg": published.LQG, "adfc": published.ADFC}
+
+
+def study_tables(dataset: xr.Dataset) -> list[Table]:
+    """Table 4, then one table of percentiles a motion."""
+    motions = [str(m) for m in dataset.motion.values]
+    return [nominal_table(dataset), *(distribution_table(dataset, m) for m in motions)]
+
+
+def unit_of(index: str) -> str:
+    """Unit of an index."""
+    return "ms" if index in DELAYS else "%"
+
+
+def nominal_means(dataset: xr.Dataset) -> dict[str, dict[str, float]]:
+    """Controller -> index -> mean over the motions, nominal plant (NaN if a run diverged)."""
+    mean = dataset.value.sel(trial=0).mean("motion", skipna=False)
+    return {
+        str(c): dict(zip(NAMES, mean.sel(controller=c).values.tolist(), strict=True))
+        for c in dataset.controller.values
+    }
+
+
+def nominal_table(dataset: xr.Dataset) -> Table:
+    """The paper's Table 4 and our numbers (nominal plant, mean over the motions)."""
+    means = nominal_means(dataset)
+    heads = ["index", "experiment (LQG)"]
+    for name in means:
+        label = controller_label(name)
+        known = name in PUBLISHED
+        heads += [f"{label}, paper", f"{label}, here", "deviation"] if known else [f"{label}, here"]
+    rows = []
+    for index in NAMES:
+        printed = published.TABLE4[index]
+        cells = [f"{index} [{unit_of(index)}]", f"{printed[published.EXPERIMENT]:g}"]
+        for name, found in means.items():
+            value = found[index]
+            if name not in PUBLISHED:
+                cells.append(number(value))
+                continue
+            paper = printed[PUBLISHED[name]]
+            off = "–" if np.isnan(value) else f"{100 * (value / paper - 1):+.0f} %"
+            cells += [f"{paper:g}", number(value), off]
+        rows.append(tuple(cells))
+    motions = ", ".join(motion_label(str(m)) for m in dataset.motion.values)
+    note = (
+        f"Nominal plant, one noise draw, mean over {motions}; the paper's columns are over El "
+        "Centro, Kobe and Morgan Hill scaled by 0.40."
+    )
+    return Table("Table 4: nominal plant", tuple(heads), rows, (note,))
+
+
+def distribution_table(dataset: xr.Dataset, motion: str) -> Table:
+    """P5, P50 and P95 of every index over the uncertain plants, controller beside controller."""
+    names = [str(c) for c in dataset.controller.values]
+    heads = ["index", *(f"{controller_label(c)} P{p}" for c in names for p in PERCENTS)]
+    value = {c: dataset.value.sel(controller=c, motion=motion).values[1:] for c in names}
+    rows = [
+        (
+            f"{index} [{unit_of(index)}]",
+            *(number(percentile(value[c][:, i], p).value) for c in names for p in PERCENTS),
+        )
+        for i, index in enumerate(NAMES)
+    ]
+    counts = ", ".join(
+        f"{controller_label(c)} {int(np.isfinite(v[:, 0]).sum())} of {len(v)}"
+        for c, v in value.items()
+    )
+    note = f"Over the uncertain plants that finished: {counts}."
+    return Table(f"{motion_label(motion)}: percentiles", tuple(heads), rows, (note,))
+
+
+def tidy_rows(dataset: xr.Dataset) -> list[tuple]:
+    """(table, motion, controller, index, unit, statistic, value) of every number, all digits."""
+    rows = []
+    for name, found in nominal_means(dataset).items():
+        for index in NAMES:
+            head = ("table4", "mean", name, index, unit_of(index))
+            rows.append((*head, "here", found[index]))
+            if name in PUBLISHED:
+                rows.append((*head, "published", published.TABLE4[index][PUBLISHED[name]]))
+    for motion in map(str, dataset.motion.values):
+        for name in map(str, dataset.controller.values):
+            cell = dataset.value.sel(controller=name, motion=motion).values[1:]
+            for i, index in enumerate(NAMES):
+                for p in PERCENTS:
+                    found = percentile(cell[:, i], p)
+                    head = ("percentiles", motion, name, index, unit_of(index))
+                    rows.append((*head, f"P{p}", found.value))
+                    rows.append((*head, f"P{p}_low", found.low))
+                    rows.append((*head, f"P{p}_high", found.high))
+    return rows
+
+
+def render(dataset: xr.Dataset, style: str) -> str:
+    """All tables as Markdown, LaTeX (booktabs) or tidy CSV.
+
+    Raises:
+        InputError: for a format that is none of ``FORMATS``.
+    """
+    if style == "md":
+        return "\n".join(t.markdown() for t in study_tables(dataset))
+    if style == "tex":
+        return "\n\n".join(latex(t) for t in study_tables(dataset)) + "\n"
+    if style == "csv":
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(("table", "motion", "controller", "index", "unit", "statistic", "value"))
+        for *head, value in tidy_rows(dataset):
+            writer.writerow((*head, "" if np.isnan(value) else repr(float(value))))
+        return text.getvalue()
+    raise argument_error("format", f"be one of {', '.join(FORMATS)}", repr(style))
+
+
+def latex(table: Table) -> str:
+    """A table as LaTeX; needs the package booktabs."""
+    columns = "l" + "r" * (len(table.columns) - 1)
+    body = [" & ".join(_index_cell(row)) + r" \\" for row in table.rows]
+    return "\n".join(
+        [
+            r"\begin{table}",
+            rf"\caption{{{_escaped(table.title)}. {_escaped(' '.join(table.notes))}}}",
+            rf"\begin{{tabular}}{{{columns}}}",
+            r"\toprule",
+            " & ".join(map(_escaped, table.columns)) + r" \\",
+            r"\midrule",
+            *body,
+            r"\bottomrule",
+            r"\end{tabular}",
+            r"\end{table}",
+        ]
+    )
+
+
+def _index_cell(row: Sequence[str]) -> list[str]:
+    index, _, unit = row[0].partition(" ")
+    return [f"{index_label(index)} {_escaped(unit)}", *map(_escaped, row[1:])]
+
+
+_LATEX = {"&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
+          "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": r"\textbackslash{}",
+          "–": "--"}  # fmt: skip
+
+
+def _escaped(text: str) -> str:
+    text = "".join(_LATEX.get(c, c) for c in text)
+    return text if not text.startswith("-") or text == "--" else f"${text}$"
