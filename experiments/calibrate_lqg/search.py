@@ -56,7 +56,8 @@ def main() -> None:
 def search(loop, name, design, start, seconds, seed):
     """Best of repeated least squares, the first from `start`, the others from around the best."""
     rng = np.random.default_rng(seed)
-    end, best, best_cost, tries = time.time() + seconds, start, np.inf, 0
+    end, best, tries = time.time() + seconds, start, 0
+    best_cost = 0.5 * float(np.sum(residuals(loop, design, start) ** 2))
     spread = 0.02 if name == "gains" else 0.7
     while time.time() < end:
         point = best if tries == 0 else best + spread * rng.normal(size=best.size)
