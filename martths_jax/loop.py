@@ -1,7 +1,8 @@
 """One sample period, and the one scan over time that repeats it.
 
 Everything here is pure: what stays (benchmark, controller, plants) and what moves (``LoopState``)
-are pytrees, trials stand on the last axis.  ``sample_period`` read from top to bottom is the physics.
+are pytrees, trials stand on the last axis.  ``sample_period`` read from top to bottom is the
+physics.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from martths_jax.structure.modal import ModalSystem, advance, contract, output
 
 #: Length of the time loop's windows for controllers that keep none [samples].
 WINDOW = 1024
+#: Shapes, before the trials, of the signals that running sums and watch read.
+BOOKED = {"x_a": (2,), "x_m": (2,), "x_hat": (2,), "u": (2,), "num": (6,), "est": (2,), "held": ()}
 
 
 @jax.tree_util.register_dataclass
@@ -128,6 +131,7 @@ def run(
     *,
     trials: int,
     lags: tuple[int, int],
+    samples: jax.Array | None = None,
     keep: int = 0,
     segment: int = 0,
     tally: Any = None,
@@ -145,6 +149,8 @@ def run(
         noise: (N, 1 or 2, T or 1) sensor noise [mm].
         trials: number T of trials in the batch.
         lags: (lead, lag) range of the cross-correlations [samples].
+        samples: length of the motion where `ground`, `reference` and `noise` are padded beyond it;
+            a traced number, so that motions of any length share a program.  Not for reverse mode.
         keep: return the signals of the first so many trials too.
         segment: for reverse mode: keep the state only once in so many samples (a divisor of the
             window) and go through the segment again for its derivative; 0 keeps every sample's.
@@ -155,32 +161,33 @@ def run(
         sums for the indices, watch for the status, signals (N, ..., T) (empty if `keep` is 0), what
         the tally has summed (None without one).
     """
-    N = ground.shape[0]
+    rows = ground.shape[0]
+    N = rows if samples is None else samples
     length = controller.window or WINDOW
-    windows = -(-N // length)
+    windows = rows // length + 1  # one sample more than the motion, which books the last one
 
-    def in_windows(x):
-        padded = jnp.pad(x, [(0, windows * length - N)] + [(0, 0)] * (x.ndim - 1))
+    def in_windows(x, late=0):
+        padded = jnp.pad(x, [(late, windows * length - rows - late)] + [(0, 0)] * (x.ndim - 1))
         return padded.reshape(windows, length, *x.shape[1:])
 
     def sample(moving, inputs):
-        state, sums, watch, extra = moving
-        k, ground_k, reference_k, noise_k, delayed = inputs
-        state, signals, record = sample_period(
-            benchmark, controller, plant, state, k, ground_k, noise_k, delayed
-        )
-        valid = k < N
-        sums = _accumulate(sums, signals, reference_k[:, None], valid)
-        watch = watching.update(watch, k, valid, signals)
-        if tally is not None:
-            extra = tally.add(extra, signals, reference_k[:, None], valid)
+        state, done, *booked = moving
+        k, ground_k, reference_done, noise_k, delayed = inputs
+        # The sums read the signals of the sample before from the carry: what is carried is computed
+        # once, while the compiler repeats the arithmetic of other values in all that read them.
+        valid = (k > 0) & (k <= N)
+        booked = _book(booked, done, reference_done[:, None], k - 1, valid, tally)
         strokes = tuple(
-            jnp.where(valid, signals[name][i], 0.0)
+            jnp.where(valid, done[name][i], 0.0)
             for name in ("x_a", "x_m", "x_hat")
             for i in range(2)
         )
+        state, signals, record = sample_period(
+            benchmark, controller, plant, state, k, ground_k, noise_k, delayed
+        )
+        done = {name: signals.get(name, x) for name, x in done.items()}
         kept = {name: x[..., :keep] for name, x in signals.items()} if keep else {}
-        return (state, sums, watch, extra), (strokes, record, kept)
+        return (state, done, *booked), (strokes, record, kept)
 
     def piece(carry, inputs):
         moving, tail, correlation = carry
@@ -199,31 +206,36 @@ def run(
             records, signals = jax.tree.map(join, outputs)
         else:
             carry, (records, signals) = piece(carry, inputs)
-        (state, *sums), *correlations = carry
+        (state, *rest), *correlations = carry
         state = replace(state, controller=controller.turn(state.controller))
-        return (records, ((state, *sums), *correlations)), signals
+        return (records, ((state, *rest), *correlations)), signals
 
     blank = controller.blank_record(trials)
     records = jax.tree.map(lambda x: jnp.zeros((length, *x.shape), x.dtype), blank)
     state = initial_state(benchmark, controller, plant, trials)
+    done = {name: jnp.zeros((*shape, trials)) for name, shape in BOOKED.items()}
     extra = None if tally is None else tally.init(trials)
     carry = (
         records,
         (
-            (state, blank_sums(trials), watching.init(trials), extra),
+            (state, done, blank_sums(trials), watching.init(trials), extra),
             (jnp.zeros((sum(lags), trials)),) * 6,
             (jnp.zeros((sum(lags) + 1, trials)),) * 4,
         ),
     )
-    samples = jnp.arange(windows * length).reshape(windows, length)
-    inputs = (samples, *map(in_windows, (ground, reference, noise)))
-    carry, signals = jax.lax.scan(window, carry, inputs)
+    numbers = jnp.arange(windows * length).reshape(windows, length)
+    inputs = (numbers, in_windows(ground), in_windows(reference, late=1), in_windows(noise))
+    if samples is None or keep:
+        carry, signals = jax.lax.scan(window, carry, inputs)
+    else:
+        one = lambda i, so_far: window(so_far, jax.tree.map(lambda x: x[i], inputs))[0]  # noqa: E731
+        carry, signals = jax.lax.fori_loop(0, N // length + 1, one, carry), {}
 
-    _, ((_, sums, watch, extra), tail, correlation) = carry
+    _, ((_, _, sums, watch, extra), tail, correlation) = carry
     # The last `lead` samples still wait for targets that come after them: none do.
     nothing = (jnp.zeros((lags[0], trials)),) * 6
     correlation = jax.tree.map(jnp.add, correlation, _correlate_window(tail, nothing, lags)[0])
-    signals = jax.tree.map(lambda x: x.reshape(windows * length, *x.shape[2:])[:N], signals)
+    signals = jax.tree.map(lambda x: x.reshape(windows * length, *x.shape[2:])[:rows], signals)
     index_sums = IndexSums(
         *(jnp.concatenate(group) for group in zip(*sums, strict=True)),
         correlation=jnp.stack(correlation, axis=1),
@@ -231,6 +243,15 @@ def run(
         fs=benchmark.fs,
     )
     return index_sums, watch, signals, extra
+
+
+def _book(booked, signals, reference, k, valid, tally):
+    """Add sample k to the running sums, the watch and the tally."""
+    sums, watch, extra = booked
+    if tally is not None:
+        extra = tally.add(extra, signals, reference, valid)
+    sums = _accumulate(sums, signals, reference, valid)
+    return sums, watching.update(watch, k, valid, signals), extra
 
 
 def _accumulate(sums, signals, reference, valid):

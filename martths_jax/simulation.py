@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import jax
@@ -20,12 +20,16 @@ from martths_jax.controllers import Controller
 from martths_jax.indices import IndexSums, peak_at_edge
 from martths_jax.motions import Motion
 from martths_jax.plant import Plants
+from martths_jax.runtime import compiler_options
 from martths_jax.sensors import SensorNoise
 from martths_jax.structure.modal import respond
 from martths_jax.watch import Status
 
 #: Trials a device runs side by side: enough for wide vectors, few enough to stay in its cache.
-LANES = 128
+LANES = 64
+#: Motions are padded to a multiple of this, so that records of all usual lengths share a program;
+#: the loop stops where the motion ends [samples].
+ROOM = 2**16
 #: Ranges of the cross-correlations [samples at 1024 Hz], tried in turn until the peak is inside.
 LAG_RANGES = ((6, 13), (32, 96), (256, 512))
 
@@ -230,7 +234,7 @@ def run_block(setup: Setup, plants, noise: jax.Array, which: np.ndarray, devices
     """Run the trials `which`, with the lag range widened until it holds every delay.
 
     Args:
-        noise: (N, 1 or 2, lanes or 1) sensor noise of the filled block [mm].
+        noise: (N or more, 1 or 2, lanes or 1) sensor noise of the filled block [mm].
         which: positions of the trials in `plants`, at most ``LANES`` a device.
         devices: the devices to spread the block over.
         keep: return signals, trial first.
@@ -244,11 +248,14 @@ def run_block(setup: Setup, plants, noise: jax.Array, which: np.ndarray, devices
     controller = jax.tree.unflatten(tree, leaves)
     kept = min(which.size, LANES) if keep else 0
     own_noise = noise.shape[-1] > 1
+    samples = setup.ground.shape[0]
+    room = samples if keep else -(-max(samples, noise.shape[0]) // ROOM) * ROOM
+    ground, reference, noise = (fit(x, room) for x in (setup.ground, setup.reference, noise))
     for attempt in range(controller.first_lag_range, len(LAG_RANGES)):
         lags = lag_range(attempt, setup.benchmark.fs)
         program = compiled(tuple(devices), setup.per_trial, own_noise, lags, kept)
         sums, watch, signals = program(
-            setup.benchmark, controller, plants[lanes], setup.ground, setup.reference, noise
+            setup.benchmark, controller, plants[lanes], ground, reference, noise, samples
         )
         back = lambda x: np.moveaxis(np.asarray(x)[: which.size], 0, -1)  # noqa: E731
         sums, watch = jax.tree.map(back, (sums, watch))
@@ -258,12 +265,18 @@ def run_block(setup: Setup, plants, noise: jax.Array, which: np.ndarray, devices
     return sums, watch, jax.tree.map(lambda x: np.asarray(x)[: which.size], signals)
 
 
+@partial(jax.jit, static_argnums=1)
+def fit(x: jax.Array, length: int) -> jax.Array:
+    """(N, ...) cut or filled up with zeros to (length, ...)."""
+    return jnp.pad(x[:length], [(0, max(0, length - x.shape[0]))] + [(0, 0)] * (x.ndim - 1))
+
+
 @lru_cache(maxsize=64)
 def compiled(devices: tuple, per_trial: tuple[bool, ...], own_noise: bool, lags, kept: int):
     """The jitted program of one kind of block; its outputs have the trials first."""
     mesh = Mesh(np.array(devices), ("trials",))
 
-    def local(benchmark, controller, plants, ground, reference, noise):
+    def local(benchmark, controller, plants, ground, reference, noise, samples):
         outcome = loop.run(
             benchmark,
             controller,
@@ -273,11 +286,12 @@ def compiled(devices: tuple, per_trial: tuple[bool, ...], own_noise: bool, lags,
             noise,
             trials=LANES,
             lags=lags,
+            samples=samples,
             keep=kept,
         )[:3]
         return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), outcome)
 
-    def program(benchmark, controller, plants, ground, reference, noise):
+    def program(benchmark, controller, plants, ground, reference, noise, samples):
         leaves, tree = jax.tree.flatten(controller)
         specs = [
             P(*[None] * (jnp.ndim(x) - 1), "trials") if own else P()
@@ -294,12 +308,13 @@ def compiled(devices: tuple, per_trial: tuple[bool, ...], own_noise: bool, lags,
                 P(),
                 P(),
                 P(None, None, "trials") if own_noise else P(),
+                P(),
             ),
             out_specs=P("trials"),
             check_vma=False,
-        )(benchmark, controller, plants, ground, reference, noise)
+        )(benchmark, controller, plants, ground, reference, noise, samples)
 
-    return jax.jit(program)
+    return jax.jit(program, compiler_options=compiler_options())
 
 
 def draw_noise(noise, trial, samples: int, fs: float, lanes=None) -> jax.Array:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-import martths_jax  # noqa: F401  (switches float64 on before any test touches JAX)
+import martths_jax  # first: it switches float64 on before any test touches JAX
 
 SIBLING = Path(__file__).resolve().parents[2] / "shared" / "benchmark"
 

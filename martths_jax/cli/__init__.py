@@ -15,7 +15,7 @@ from martths_jax.errors import InputError
 app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
-    help="Virtual multi-axial real-time hybrid simulation (v-maRTHS): single runs, studies, tables.",
+    help="Virtual multi-axial real-time hybrid simulation (v-maRTHS): runs, studies, tables.",
 )
 app.command("modes")(nominal.modes)
 app.command("run")(nominal.run)

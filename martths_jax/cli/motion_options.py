@@ -1,7 +1,7 @@
 """The options that say which ground motions a command runs on, the same for every command.
 
-    def run(motion: Motions = DEFAULT, records: Records = None, scale: Scale = None, ...):
-        for one in load_all(motion, records, scale, pga, sa, units, resample, fs): ...
+def run(motion: Motions = DEFAULT, records: Records = None, scale: Scale = None, ...):
+    for one in load_all(motion, records, scale, pga, sa, units, resample, fs): ...
 """
 
 from __future__ import annotations

@@ -177,7 +177,7 @@ def table4(
     seed: Seed = 0,
     scale: Scale = None,
 ) -> None:
-    """The 48 numbers of Table 4 (24 indices, LQG and ADFC, nominal plant) beside the published ones.
+    """The 48 numbers of Table 4 (24 indices, LQG and ADFC, nominal plant) beside those in print.
 
     Uses El Centro, Kobe and Morgan Hill from --records (or $MARTHS_RECORDS), and the built-in
     motions that behave like them where those are not found.

@@ -1,8 +1,8 @@
 """Normal equations of a small least-squares problem, for a whole batch of trials at once.
 
 The code below is scalar algebra in which each "number" is an array over trials (T,).  The
-symmetric matrix G = sum phi phi' and the right side h = sum phi u' are held as packed rows: row j is
-the tuple (G[j, j], ..., G[j, n-1], h[j, 0], ..., h[j, r-1]).  Compilers turn this into long vector
+symmetric matrix G = sum phi phi' and the right side h = sum phi u' are held as packed rows: row j
+is the tuple (G[j, j], ..., G[j, n-1], h[j, 0], ..., h[j, r-1]).  Compilers turn this into long vector
 kernels without index arithmetic; two-dimensional rows and (n, n, T) arrays are slower on CPUs, and
 a batched LAPACK call, which is one small call a trial, is far slower.
 """

@@ -96,7 +96,7 @@ def deformed(g: FrameGeometry, found: Modes, mode: int, size: float):
         size: largest nodal displacement as drawn [m].
     """
     shape = diaphragm_map() @ found.shape[:, mode]  # (38,)
-    scale = size / np.max(np.abs(shape[:24]))
+    scale = size / np.max(np.hypot(shape[:12], shape[12:24]))
     scale *= np.sign(shape[2]) or 1.0  # the roof goes to the right
     return [
         (np.array([_place(g, a), _place(g, b)]).T, _curve(g, scale * shape, a, b))

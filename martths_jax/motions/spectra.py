@@ -120,9 +120,7 @@ def response_spectrum(
     for count in np.unique(parts):
         chosen = np.flatnonzero(parts == count)
         fine = subdivide(acceleration, int(count))
-        for i, one in zip(
-            chosen, oscillators(periods[chosen], damping, dt / count), strict=True
-        ):
+        for i, one in zip(chosen, oscillators(periods[chosen], damping, dt / count), strict=True):
             spectrum[i] = np.max(np.abs(one.run(fine)))
     return (2 * np.pi / periods) ** 2 * spectrum
 

@@ -179,8 +179,9 @@
     const end = (current.samples - 1) * current.dt;
     const gap = 0.025, height = (1 - gap * (panels.length - 1)) / panels.length;
     const layout = {
-      margin: { l: 62, r: 12, t: 8, b: 42 }, showlegend: window.innerWidth > 900,
-      legend: { font: { size: 10 }, tracegroupgap: 10 }, hovermode: "x", dragmode: "zoom",
+      margin: { l: 62, r: 12, t: 34, b: 42 }, hovermode: "x", dragmode: "zoom",
+      legend: window.innerWidth > 900 ? { font: { size: 10 }, tracegroupgap: 10 }
+        : { font: { size: 10 }, orientation: "h", y: -0.09, yanchor: "top" },
       xaxis: { title: { text: "time [s]" }, range: [0, end], anchor: `y${panels.length}` },
     };
     panels.forEach((panel, i) => {
@@ -202,7 +203,8 @@
     });
     Plotly.react(plot, traces, layout, {
       responsive: true, displaylogo: false, doubleClick: false,
-      modeBarButtonsToRemove: ["autoScale2d", "lasso2d", "select2d"],
+      // Only what stays on this machine: Plotly's own set offers to upload the chart.
+      modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]],
     });
     byId("plot-note").textContent =
       `${current.controller} on ${current.motion}, trial ${current.trial} (${current.role}). ` +

@@ -59,7 +59,7 @@ def nominal_table(dataset: xr.Dataset) -> Table:
                 cells.append(number(value))
                 continue
             paper = printed[PUBLISHED[name]]
-            off = "–" if np.isnan(value) else f"{100 * (value / paper - 1):+.0f} %"
+            off = "–" if np.isnan(value) else f"{round(100 * (value / paper - 1)):+d} %"
             cells += [f"{paper:g}", number(value), off]
         rows.append(tuple(cells))
     motions = ", ".join(motion_label(str(m)) for m in dataset.motion.values)

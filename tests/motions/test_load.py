@@ -65,9 +65,7 @@ def test_senseless_arguments_are_refused(folder, arguments, words):
 def test_linear_sampling_is_the_benchmarks(folder):
     motion = load_motion("waveone", records=folder, scale=1.0, tail=0.0)
     assert motion.acceleration.size == int(TIME[-1] * 1024) + 1
-    np.testing.assert_allclose(
-        motion.acceleration, np.interp(motion.time, TIME, WAVE), atol=1e-8
-    )
+    np.testing.assert_allclose(motion.acceleration, np.interp(motion.time, TIME, WAVE), atol=1e-8)
 
 
 def test_band_limited_sampling_follows_the_wave_between_samples():
@@ -95,9 +93,7 @@ def test_quiet_tail_is_appended_with_a_notice_and_only_once(folder, tmp_path):
     quiet = motion.time > motion.duration - 4.9
     assert np.abs(motion.acceleration[quiet]).max() <= 1e-3 * np.abs(motion.acceleration).max()
     assert any("zeros were appended" in notice for notice in motion.notices)
-    text = "\n".join(
-        f"{k * DT:.9g},{a:.9g}" for k, a in enumerate(np.append(WAVE, np.zeros(250)))
-    )
+    text = "\n".join(f"{k * DT:.9g},{a:.9g}" for k, a in enumerate(np.append(WAVE, np.zeros(250))))
     (tmp_path / "quiet.csv").write_text(text)
     assert load_motion(tmp_path / "quiet.csv", units="m/s2").notices == ()
     assert load_motion("waveone", records=folder, tail=0.0).notices == ()

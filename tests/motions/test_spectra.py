@@ -74,9 +74,7 @@ def test_short_periods_on_a_coarse_record_need_the_finer_grid():
     true = response_spectrum(pulse, dt, periods)
     finest = response_spectrum(pulse, dt, periods, points_per_period=1280)
     np.testing.assert_allclose(true, finest, rtol=3.2e-3)
-    sampled = [
-        (2 * np.pi / p) ** 2 * np.abs(sdof_response(pulse, dt, p)[0]).max() for p in periods
-    ]
+    sampled = [(2 * np.pi / p) ** 2 * np.abs(sdof_response(pulse, dt, p)[0]).max() for p in periods]
     assert np.max(1 - sampled / true) > 0.10
 
 

@@ -54,6 +54,11 @@ def test_loads_without_errors_and_without_network(page, report):
     outside = [u for u in page.requests if not u.startswith(("file:", "data:", "about:", "blob:"))]
     assert outside == []
     assert page.evaluate("document.querySelectorAll('#plot .xy path.js-line').length") > 0
+    # Nothing offers to upload the chart.
+    buttons = page.evaluate(
+        "[...document.querySelectorAll('.modebar-btn')].map(b => b.dataset.title)"
+    )
+    assert len(buttons) == 6 and not any("hare" in title for title in buttons)
     broken = "[...document.images].filter(i => i.complete && i.naturalWidth === 0).length"
     assert page.evaluate(broken) == 0
     assert report.stat().st_size < 25e6

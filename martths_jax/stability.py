@@ -1,0 +1,195 @@
+"""Stability of the hybrid loop with frozen coefficients: spectral radius and delay margin.
+
+A run of an adaptive controller is a sequence of linear loops, one for each set of coefficients.
+Freezing them at a sample gives a linear time-invariant loop xi(k+1) = A xi(k) of structure, plant,
+filter, interface history and target history.  Its spectral radius says whether the loop would
+decay if adaptation stopped there: below one it does.  It is a diagnostic of each instant, no proof
+for the time-varying loop.
+
+A is the derivative of the engine's own ``sample_period`` at rest, so nothing is modelled twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+
+from martths_jax.benchmark import Benchmark
+from martths_jax.controllers import Controller, Decision
+from martths_jax.controllers.adfc import ADFC, TAPS, regress
+from martths_jax.errors import argument_error
+from martths_jax.loop import initial_state, sample_period
+from martths_jax.plant import Plants
+from martths_jax.structure.modal import spread
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class FrozenFeedforward(Controller):
+    """u(k) = C' phi_a(k) with coefficients that stay: ADFC without its identification.
+
+    Attributes:
+        coefficients: (8, 2) or (8, 2, T), in scaled derivatives (``ADFC``'s ``C_A``).
+        estimator: the Kalman filter that runs with it.
+    """
+
+    coefficients: jax.Array
+    estimator: Any = None
+
+    name = "frozen"
+
+    def init(self, trials):
+        return ((jnp.zeros(trials),) * (TAPS - 1),) * 2
+
+    def step(self, state, seen):
+        state, phi = regress(state, seen.target_mm)
+        C = self.coefficients
+        command = [sum(C[j, i] * p for j, p in enumerate(phi)) for i in range(2)]
+        return state, Decision(command_mm=jnp.stack(command))
+
+
+def frozen_adfc(benchmark: Benchmark, adfc: ADFC, coefficients) -> FrozenFeedforward:
+    """The loop's controller when `adfc` stops adapting with the given (8, 2[, T]) coefficients."""
+    ready = adfc.prepare(benchmark)
+    return FrozenFeedforward(jnp.asarray(coefficients, dtype=float), estimator=ready.estimator)
+
+
+def linear_loop(
+    benchmark: Benchmark, controller: Controller, plants: Plants, *, opened: bool = False
+):
+    """Matrices of the loop linearised at rest, xi(k+1) = A xi(k) + B v(k), u(k) = C xi(k).
+
+    Args:
+        benchmark: from ``build_benchmark``.
+        controller: a linear time-invariant one, prepared: ``Passthrough``, ``LQG``,
+            ``FrozenFeedforward`` (its coefficients one a trial or shared).
+        plants: T of them.
+        opened: cut the loop at the plants' input: v (2 values, mm) drives the plants instead of
+            the command u, while the filter still hears u.  Otherwise v = u.
+
+    Returns:
+        (T, n, n) A, or with `opened` the tuple A, B (T, n, 2), C (T, 2, n).
+    """
+    if isinstance(controller, ADFC):
+        raise argument_error(
+            "controller", "be linear and time-invariant", "an adaptive ADFC",
+            "Freeze it: frozen_adfc(benchmark, adfc, coefficients).",
+        )  # fmt: skip
+    A, B, C = _linearised(benchmark, controller, plants.discretise(benchmark.dt))
+    return (A, B, C) if opened else A + B @ C
+
+
+@jax.jit
+def _linearised(benchmark, controller, system):
+    """``linear_loop`` with the loop cut, for all plants of a discretised batch."""
+    shared = getattr(controller, "coefficients", jnp.zeros(0)).ndim < 3
+
+    def one(plant, coefficients):
+        own = controller if shared else replace(controller, coefficients=coefficients)
+        plant = jax.tree.map(lambda x: x[..., None], plant)
+        rest, unravel = ravel_pytree(initial_state(benchmark, own, plant, 1))
+
+        def step(xi, v):
+            # k = 1 stands for any sample after the first, whose differences are special.
+            after, signals, _ = sample_period(
+                benchmark, own, plant, unravel(xi), jnp.asarray(1), 0.0, jnp.zeros((2, 1)), None
+            )
+            command = signals["u"]
+            driven = after.plant + spread(plant.B, v[:, None] - command)
+            return ravel_pytree(replace(after, plant=driven))[0], command[:, 0]
+
+        v = jnp.zeros(2)
+        # No command acts on itself within a sample, so there is no direct term.
+        (A, C), (B, _) = (jax.jacfwd(step, n)(rest, v) for n in (0, 1))
+        return A, B, C
+
+    last = jax.tree.map(lambda x: x.ndim - 1, system)
+    coefficients = None if shared else controller.coefficients
+    return jax.vmap(one, in_axes=(last, None if shared else 2))(system, coefficients)
+
+
+def spectral_radius(benchmark: Benchmark, controller: Controller, plants: Plants) -> np.ndarray:
+    """(T,) largest magnitude of the poles of the frozen loop [-]; below 1 it is stable.
+
+    Arguments as in ``linear_loop``.
+    """
+    A = np.asarray(linear_loop(benchmark, controller, plants))
+    radius = np.full(len(A), np.nan)
+    finite = np.isfinite(A).all(axis=(1, 2))
+    radius[finite] = np.abs(np.linalg.eigvals(A[finite])).max(axis=1)
+    return radius
+
+
+def radius_along(
+    benchmark: Benchmark, adfc: ADFC, plants: Plants, coefficients, samples: Sequence[int]
+) -> np.ndarray:
+    """Spectral radius of the frozen loop along a run: the diagnostic signal.
+
+    Args:
+        benchmark, adfc, plants: of the run.
+        coefficients: (T, N, 8, 2) ``result.signals["C_A"]``.
+        samples: S numbers of samples at which to freeze.
+
+    Returns:
+        (T, S).
+    """
+    chosen = np.asarray(coefficients)[:, np.asarray(samples)]
+    T, S = chosen.shape[:2]
+    frozen = frozen_adfc(benchmark, adfc, np.moveaxis(chosen.reshape(T * S, 8, 2), 0, -1))
+    return spectral_radius(benchmark, frozen, plants[np.repeat(np.arange(T), S)]).reshape(T, S)
+
+
+def delay_margin(
+    benchmark: Benchmark, controller: Controller, plants: Plants, *, points: int = 4000
+) -> np.ndarray:
+    """Extra delay in both actuators that takes the frozen loop to the edge of stability.
+
+    The loop is cut at the plants' input; a delay tau multiplies its frequency response L(w) by
+    exp(-j w tau), so the loop stands on the edge where an eigenvalue of L(w) has magnitude one and
+    phase w tau.
+
+    Args:
+        benchmark, controller, plants: as in ``linear_loop``.
+        points: frequencies of the search, logarithmic from 0.05 Hz to half the sampling rate.
+
+    Returns:
+        (T,) delay [ms]; 0 where the loop is unstable without any, inf where none is found.
+    """
+    stable = spectral_radius(benchmark, controller, plants) < 1
+    matrices = linear_loop(benchmark, controller, plants, opened=True)
+    omega = 2 * np.pi * np.geomspace(0.05, 0.5 * benchmark.fs, points)
+    return np.array(
+        [
+            _edge(*(np.asarray(m[i]) for m in matrices), omega, benchmark.dt) if good else 0.0
+            for i, good in enumerate(stable)
+        ]
+    )
+
+
+def _edge(A, B, C, omega, dt) -> float:
+    """Smallest delay [ms] at which an eigenvalue of the open loop passes through one."""
+    poles, V = np.linalg.eig(A)
+    left, right = C @ V, np.linalg.solve(V, B)
+    z = np.exp(1j * omega * dt)
+    L = (left / (z[:, None, None] - poles)) @ right
+    loci = np.linalg.eigvals(L)
+    # Follow each branch: swap the pair wherever that makes the step between points smaller.
+    for i in range(1, len(loci)):
+        kept = np.abs(loci[i] - loci[i - 1]).sum()
+        if np.abs(loci[i, ::-1] - loci[i - 1]).sum() < kept:
+            loci[i] = loci[i, ::-1]
+    delays = []
+    for branch in loci.T:
+        above = np.abs(branch) - 1
+        for i in np.flatnonzero(above[:-1] * above[1:] <= 0):
+            part = above[i] / (above[i] - above[i + 1]) if above[i] != above[i + 1] else 0.0
+            value = branch[i] + part * (branch[i + 1] - branch[i])
+            w = omega[i] + part * (omega[i + 1] - omega[i])
+            delays.append((np.angle(value) % (2 * np.pi)) / w)
+    return 1e3 * min(delays, default=np.inf)
