@@ -19,8 +19,8 @@ test: $(STAMP)  ## Check the style and run all tests.
 	$(BIN)/ruff check .
 	$(BIN)/python -m pytest
 
-study: $(STAMP)  ## Nominal runs on the motions that are there: the columns of Table 4.
-	$(BIN)/martths table4 $(if $(RECORDS),--records $(RECORDS)) --out runs/table4
+study: $(STAMP)  ## The study: 1000 uncertain plants, three motions, two controllers.
+	$(BIN)/martths study $(if $(RECORDS),--records $(RECORDS)) --out runs/study
 
 lint: $(STAMP)  ## Check the style.
 	$(BIN)/ruff check .

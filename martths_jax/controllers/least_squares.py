@@ -2,8 +2,8 @@
 
 The code below is scalar algebra in which each "number" is an array over trials (T,).  The
 symmetric matrix G = sum phi phi' and the right side h = sum phi u' are held as packed rows: row j
-is the tuple (G[j, j], ..., G[j, n-1], h[j, 0], ..., h[j, r-1]).  Compilers turn this into long vector
-kernels without index arithmetic; two-dimensional rows and (n, n, T) arrays are slower on CPUs, and
+is the tuple (G[j, j], ..., G[j, n-1], h[j, 0], ..., h[j, r-1]).  Compilers turn this into long
+vector kernels without index arithmetic; arrays of two and three dimensions are slower on CPUs, and
 a batched LAPACK call, which is one small call a trial, is far slower.
 """
 

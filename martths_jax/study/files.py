@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -55,6 +56,25 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file whole (see ``writing``)."""
     with writing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def alone(path: Path, patience: float = 5.0) -> Iterator[None]:
+    """Keep other processes that use this out of a block; a lock left by a killed one is broken."""
+    lock = path.with_name(f".{path.name}.part.lock")
+    deadline = time.monotonic() + patience
+    while True:
+        try:
+            os.close(os.open(lock, os.O_CREAT | os.O_EXCL))
+            break
+        except FileExistsError:
+            if time.monotonic() > deadline:
+                break
+            time.sleep(0.02)
+    try:
+        yield
+    finally:
+        lock.unlink(missing_ok=True)
 
 
 def remove_leftovers(folder: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 import time
 from pathlib import Path
@@ -19,7 +20,7 @@ from martths_jax.study.dataset import assemble, save_dataset
 from martths_jax.study.distributed import wait_for_all
 from martths_jax.study.engine import Engine, choose_devices
 from martths_jax.study.export import write_csv
-from martths_jax.study.files import write_text
+from martths_jax.study.files import alone, write_text
 from martths_jax.study.memory import GB, choose_chunk, lane_bytes
 from martths_jax.study.plan import Plan, build_plan
 from martths_jax.study.progress import Reporter, Tally, compile_seconds
@@ -140,6 +141,8 @@ class Session:
             "chunk": engine.chunk,
             "trials": 0,
         }
+        self.about["process"] = os.getpid()
+        self.name = {k: self.about[k] for k in ("started", "host", "process")}
         self.compiled = compile_seconds()
 
     def save(self) -> None:
@@ -150,10 +153,11 @@ class Session:
             "compile_seconds": round(compile_seconds() - self.compiled, 3),
         }
         path = self.run.path / "provenance.json"
-        sessions = read_provenance(self.run.path)["sessions"]
-        same = lambda s: all(s.get(k) == self.about[k] for k in ("started", "host"))  # noqa: E731
-        sessions = [s for s in sessions if not same(s)] + [self.about]
-        write_text(path, json.dumps({"sessions": sessions}, indent=1))
+        same = lambda s: all(s.get(k) == v for k, v in self.name.items())  # noqa: E731
+        with alone(path):  # processes of one study end at the same time
+            sessions = read_provenance(self.run.path)["sessions"]
+            sessions = [s for s in sessions if not same(s)] + [self.about]
+            write_text(path, json.dumps({"sessions": sessions}, indent=1))
 
 
 def read_provenance(folder: Path) -> dict:

@@ -6,7 +6,6 @@ import csv
 import json
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from martths_jax.benchmark import Benchmark
@@ -82,6 +81,8 @@ def _write_csv(path: Path, rows: list[dict]) -> None:
 
 def _plot(history: list[dict], path: Path) -> None:
     """Objective over steps, refused ones marked, and the numbers below."""
+    import matplotlib.pyplot as plt  # slow to import, and only needed here
+
     figure, (top, bottom) = plt.subplots(
         2, 1, sharex=True, figsize=(6.5, 5.5), layout="constrained"
     )

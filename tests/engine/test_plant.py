@@ -121,7 +121,7 @@ def test_kalman_gains_solve_their_riccati_equation():
         A @ corrected @ A.T + q * B @ B.T, P, rtol=1e-6, atol=1e-10 * np.abs(P).max()
     )
     theirs, _, _ = control.dlqe(A, B, C, q * np.eye(2), r * np.eye(2))
-    np.testing.assert_allclose(L, theirs, rtol=1e-5, atol=1e-8 * np.abs(L).max())
+    np.testing.assert_allclose(predictor, theirs, rtol=1e-5, atol=1e-8 * np.abs(L).max())
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ import numpy as np
 from martths_jax import Motion
 
 SAMPLES = 600
-#: Memory [GB] that holds exactly one block of 128 such trials: one device, chunks of 128.
-ONE_BLOCK = 0.003
+#: Memory [GB] that holds exactly one block (``LANES``) of such trials, so one device is used.
+ONE_BLOCK = 0.0015
 
 
 def short_motion(name: str = "one", phase: float = 0.0, factor: float = 1.0) -> Motion:
