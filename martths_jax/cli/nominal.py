@@ -148,7 +148,7 @@ def _save_run(out: Path, motion, result, settings: dict) -> None:
         "scale": motion.scale,
         "fs": result.fs,
         "controller": result.controller,
-        "status": result.describe(0) if hasattr(result, "describe") else int(result.status[0]),
+        "status": result.describe(0),
         "volt_peak": np.asarray(result.watch.volt_peak)[:, 0].tolist(),
     }
     with atomic(out / f"{stem}_run.json") as part:
