@@ -46,6 +46,10 @@ class RunFolder:
                 ``command_line``, ``commits``, ``platform``.
     """
 
+    #: What a run of this kind leaves in its folder, and what it is called.
+    own: tuple[str, ...] = OWN
+    what: str = "study"
+
     def __init__(self, path: Path, header: dict):
         self.path, self.header = path, header
 
@@ -60,7 +64,9 @@ class RunFolder:
         try:
             header = json.loads(file.read_text("utf-8"))
         except FileNotFoundError:
-            raise InputError(f"{path} holds no study (no run.json); give its folder.") from None
+            raise InputError(
+                f"{path} holds no {cls.what} (no run.json); give its folder."
+            ) from None
         except (OSError, ValueError) as error:
             raise InputError(
                 f"{file} cannot be read ({error}); restore it, or start over with --fresh."
@@ -68,8 +74,8 @@ class RunFolder:
         if not isinstance(header, dict) or header.get("format") != FORMAT:
             found = header.get("format") if isinstance(header, dict) else None
             raise InputError(
-                f"{path} holds a study of format {found}, this version reads format {FORMAT}; use "
-                "the version that wrote it, another --out, or --fresh to delete it."
+                f"{path} holds a {cls.what} of format {found}, this version reads format {FORMAT}; "
+                "use the version that wrote it, another --out, or --fresh to delete it."
             )
         return cls(path, header)
 
@@ -87,10 +93,10 @@ class RunFolder:
         """
         header = json.loads(json.dumps(header | {"format": FORMAT}))
         if fresh:
-            clear(path)
+            clear(path, cls.own)
         file = path / "run.json"
         if not file.exists():
-            stray = [name for name in OWN if (path / name).exists()]
+            stray = [name for name in cls.own if (path / name).exists()]
             if stray:
                 raise InputError(
                     f"{path} holds {', '.join(stray)} but no run.json, so what they are is "
@@ -125,8 +131,8 @@ class RunFolder:
             )
         if asked["trials"] < self.header["trials"]:
             raise InputError(
-                f"{self.path} holds a study of {self.header['trials']} trials, but "
-                f"{asked['trials']} were asked for; a study can be extended, not shortened.  "
+                f"{self.path} holds a {self.what} of {self.header['trials']} trials, but "
+                f"{asked['trials']} were asked for; a {self.what} can be extended, not shortened.  "
                 f"{remedy}"
             )
         changed = dict(self.header)
@@ -250,14 +256,14 @@ def _read_part(path: Path, trials: int) -> dict[str, np.ndarray]:
     return arrays
 
 
-def clear(path: Path) -> None:
+def clear(path: Path, own: tuple[str, ...] = OWN) -> None:
     """Delete what a run left in its folder, and nothing else.
 
     Raises:
         InputError: if it cannot be deleted.
     """
     with disk_errors(path):
-        for name in OWN:
+        for name in own:
             target = path / name
             if target.is_dir():
                 shutil.rmtree(target)
