@@ -143,16 +143,20 @@ class ADFC(Controller):
     def init(self, trials):
         zero = jnp.zeros(trials)
         taps = ((zero,) * (TAPS - 1),) * 2
+        start = tuple(tuple(jnp.broadcast_to(c, (trials,)) for c in row) for row in self.start)
         return {
-            "coefficients": tuple(
-                tuple(jnp.broadcast_to(c, (trials,)) for c in row) for row in self.start
-            ),
+            # The last fit and whether it is used, and the coefficients before it.  Carrying the
+            # fit itself, not what is chosen from it, makes the compiler compute it once; otherwise
+            # it repeats the back substitution in everything that reads a coefficient.
+            "fitted": start,
+            "use": jnp.zeros(trials, dtype=bool),
+            "coefficients": start,
             # Normal equations of the rows of the last window that are still in the buffer, and of
             # the rows of this window.
             "old": ls.zeros(8, 2, trials),
             "new": ls.zeros(8, 2, trials),
-            # Four samples before this one of both estimates, of the estimates N_b samples ago, and
-            # of both targets.
+            # Backward differences of order 0 to 3, see ``regress``, of both estimates, of the
+            # estimates N_b samples ago, and of both targets.
             "estimate": taps,
             "leaving": taps,
             "target": taps,
@@ -181,15 +185,16 @@ class ADFC(Controller):
         fitted, tolerance = ls.SOLVERS[self.solver](normal)
         good = tolerance >= 1 / CONDITION_LIMIT  # false for NaN
         held = state["held"] + jnp.where(due & ~good, 1.0, 0.0)
-        coefficients = tuple(
-            tuple(jnp.where(due & good, a, b) for a, b in zip(*rows, strict=True))
-            for rows in zip(fitted, state["coefficients"], strict=True)
-        )
+        previous = choose(state["use"], state["fitted"], state["coefficients"])
+        use = due & good
+        coefficients = choose(use, fitted, previous)
         command = tuple(
             sum(c[i] * p for c, p in zip(coefficients, phi_target, strict=True)) for i in range(2)
         )
         state = {
-            "coefficients": coefficients,
+            "coefficients": previous,
+            "fitted": tuple(map(tuple, fitted)),
+            "use": use,
             "old": old,
             "new": new,
             "estimate": estimate,
@@ -214,21 +219,33 @@ class ADFC(Controller):
         return state | {"old": state["new"], "new": jax.tree.map(jnp.zeros_like, state["new"])}
 
 
+def choose(use, new, old):
+    """`new` where `use` (T,), else `old`: rows of coefficients, two arrays (T,) each."""
+    return tuple(
+        tuple(jnp.where(use, a, b) for a, b in zip(*rows, strict=True))
+        for rows in zip(new, old, strict=True)
+    )
+
+
 def regress(before, newest: jax.Array):
-    """Regressor phi = [C_D x_1, C_D x_2] and the samples to remember for the next one.
+    """Regressor phi = [C_D x_1, C_D x_2] and the differences to remember for the next one.
+
+    The rows of ``BACKWARD_DIFFERENCES`` are x, D + D^2/2, D^2 + D^3 and D^3 + 3/2 D^4 in powers of
+    the backward difference D; D^n at a sample is D^(n-1) less D^(n-1) of the sample before.
 
     Args:
-        before: for each actuator, its last four samples (T,), newest first.
+        before: for each actuator, x, D x, D^2 x and D^3 x (T,) of the sample before.
         newest: (2, T) this sample.
 
     Returns:
-        for each actuator, its four newest samples; phi as eight arrays (T,).
+        for each actuator, its newest x ... D^3 x; phi as eight arrays (T,).
     """
     phi, kept = [], []
     for actuator in range(2):
-        taps = (newest[actuator], *before[actuator])
-        phi += [
-            sum(c * x for c, x in zip(row, taps, strict=True) if c) for row in BACKWARD_DIFFERENCES
-        ]
-        kept.append(taps[:-1])
+        differences = [newest[actuator]]
+        for earlier in before[actuator]:
+            differences.append(differences[-1] - earlier)
+        x, d1, d2, d3, d4 = differences
+        phi += [x, d1 + 0.5 * d2, d2 + d3, d3 + 1.5 * d4]
+        kept.append((x, d1, d2, d3))
     return tuple(kept), phi
