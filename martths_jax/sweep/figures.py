@@ -227,6 +227,7 @@ def lines(sweep: Sweep, axis: Axis, motion: str, shown: Sequence[str]) -> Drawin
         panel.set_xlabel(_axis_label(axis))
         if _is_logarithmic(values):
             panel.set_xscale("log")
+    axes[len(shown)].set_ylim(bottom=0, top=max(1.0, axes[len(shown)].get_ylim()[1]))
     for panel in axes[panels:]:
         panel.set_visible(False)
     handles, labels = axes[0].get_legend_handles_labels()

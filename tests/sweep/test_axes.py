@@ -1,0 +1,132 @@
+"""Axes and grids: what users may write, what is refused, and that all problems come at once."""
+
+import numpy as np
+import pytest
+
+from martths_jax import InputError
+from martths_jax.study.config import make_config
+from martths_jax.sweep import make_sweep, run_sweep
+from martths_jax.sweep.axes import SCALARS, axis_values
+from martths_jax.sweep.grid import cell_numbers, job_config, overlap
+
+
+def test_ranges_and_lists():
+    logs = axis_values("lambda", "1e-8:1e-4:log9")
+    assert np.allclose(np.diff(np.log10(logs)), 0.5) and (logs[0], logs[-1]) == (1e-8, 1e-4)
+    assert axis_values("scale", "0.1:1:lin4") == pytest.approx((0.1, 0.4, 0.7, 1.0))
+    assert axis_values("q", "1e-6, 1e-5") == (1e-6, 1e-5)
+    whole = axis_values("nb", "16:64:log3")
+    assert whole == (16, 32, 64) and all(type(v) is int for v in whole)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "part"),
+    [
+        ("nb", "", "has no values"),
+        ("nb", "8,64", "at least 9"),
+        ("nb", "64.5", "whole number"),
+        ("nb", "64,128,64", "64 more than once"),
+        ("hop", "0,1", "at least 1"),
+        ("no_fraction", "0.5,1.2", "lie in [0, 1]"),
+        ("lambda", "-1e-8", "zero or positive"),
+        ("lambda", "0:1:log5", "must be positive"),
+        ("q", "a,b", "must be numbers"),
+        ("scale", "0:1:lin3", "not zero"),
+        ("alpha", "95", "between 0 and 90"),
+        ("fs", "nan", "positive"),
+    ],
+)
+def test_refused_values(name, text, part):
+    with pytest.raises(InputError, match=r"axis|Axis") as caught:
+        axis_values(name, text)
+    assert part in str(caught.value) and f"`{name}`" in str(caught.value)
+
+
+def test_everything_wrong_is_named_at_once_and_before_anything_runs(tmp_path):
+    with pytest.raises(InputError) as caught:
+        run_sweep(
+            [("nb", "64,128"), ("no", "32,64,100,127"), ("lamda", "1"), ("forgetting", "0.9"),
+             ("nb", "256"), ("q", "")],
+            {"seed": -1}, shown=("J2_1", "J2_9"), out=str(tmp_path / "out"),
+        )  # fmt: skip
+    text = str(caught.value)
+    for part in (
+        "Axis 'lamda' is unknown; the nearest are lambda",
+        "no forgetting factor",
+        "`nb` is given twice",
+        "`q` has no values",
+        "Argument `seed`",
+        "Index 'J2_9' is unknown",
+    ):
+        assert part in text, part
+    assert not (tmp_path / "out").exists()
+
+
+def test_impossible_combinations_are_all_named():
+    with pytest.raises(InputError) as caught:
+        make_sweep({"nb": (64, 128), "no": (32, 64, 127, 200)})
+    text = str(caught.value)
+    for nb, no in ((64, 64), (64, 127), (64, 200), (128, 200)):
+        assert f"Nb = {nb} with no = {no} " in text
+    assert text.count("Nb = ") == 4, "and no possible one"
+
+
+@pytest.mark.parametrize(
+    ("axes", "changes", "part"),
+    [
+        ({}, {}, "at least one axis"),
+        ({"nb": 16, "no_fraction": (0.95, 1)}, {}, "all No = 15"),
+        ({"nb": 64, "hop": (65,)}, {}, "gives No = -1"),
+        ({"nb": 64, "fb": (1, 64)}, {}, "at fs = 1024 Hz"),
+        ({"no": 3, "hop": 4}, {}, "all set the overlap"),
+        ({"nb": 64}, {"controllers": ("lqg",)}, "moves nothing"),
+        ({"scale": (1, 2)}, {"pga": "0.4g"}, "exclude each other"),
+        ({"nb": 64}, {"controller": {"adfc": {"no": 500}}}, "no = 500 of adfc"),
+    ],
+)
+def test_refused_sweeps(axes, changes, part):
+    with pytest.raises(InputError) as caught:
+        make_sweep(axes, **changes)
+    assert part in str(caught.value)
+
+
+def test_four_ways_to_say_the_overlap_agree():
+    assert overlap("no", 48, 64, 1024) == overlap("hop", 16, 64, 1024) == 48
+    assert overlap("fb", 64.0, 64, 1024) == overlap("no_fraction", 0.75, 64, 1024) == 48
+    assert overlap("no_fraction", 1, 64, 1024) == 63, "1 is every sample"
+    sweep = make_sweep({"nb": (64, 128), "no_fraction": (0, 1)})
+    numbers = cell_numbers(sweep.grid, sweep.study)
+    assert numbers["cell_no"][..., 0].tolist() == [[0, 63], [0, 127]]
+    assert numbers["cell_hop"][..., 0].tolist() == [[64, 1], [128, 1]]
+    assert numbers["cell_fb"][..., 0].tolist() == [[16, 1024], [8, 1024]]
+
+
+def test_every_sample_stays_every_sample_where_only_nb_moves():
+    grid = make_sweep({"nb": (64, 4096)}).grid
+    assert [job.get("no") for job in grid.jobs["adfc"]] == [63, 4095]
+
+
+def test_cells_share_batches_and_jobs():
+    grid = make_sweep(
+        {"nb": (64, 128), "hop": (1, 8), "lambda": (0, 1e-6), "q": (1e-5, 3e-5)},
+        controllers=("adfc", "lqg", "passthrough"),
+    ).grid
+    sizes = sorted(len(batch) for batch in grid.batches())
+    assert sizes == [2, 2, 8, 8], "passthrough and lqg with their q, ADFC with each nb"
+    assert len(grid.places) == 16 == len(grid.jobs["passthrough"])
+
+
+def test_an_axis_changes_its_own_scalar_only():
+    """Where lambda moves, the guarded controller is still pulled towards the inverse plant."""
+    sweep = make_sweep({"lambda": (1e-6,)})
+    config = job_config(sweep.grid.jobs["adfc"][0], sweep.study)
+    assert config.controller["adfc"] == {"towards": "inverse", "pull": 1e-6}
+    given = make_config({"controllers": ("adfc",), "controller": {"adfc": {"pull": 0.0}}})
+    sweep = make_sweep({"lambda": (1e-6,)}, given)
+    config = job_config(sweep.grid.jobs["adfc"][0], sweep.study)
+    assert config.controller["adfc"] == {"towards": "start", "pull": 1e-6}
+
+
+def test_every_scalar_sets_something_known():
+    settings = {"nb", "no", "pull", "q", "scale", "fs", "spread", "noise_power", "alpha", "p"}
+    assert {s.setting for s in SCALARS.values()} == settings
