@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from martths_jax import __version__
-from martths_jax.cli import figures, motions, nominal, study, sweep, tune
+from martths_jax.cli import figures, motions, nominal, sensitivity, study, sweep, tune
 from martths_jax.cli.console import error_console
 from martths_jax.errors import InputError
 
@@ -26,6 +26,7 @@ app.command("merge")(study.merge)
 app.command("summary")(study.summary)
 app.command("export")(study.export)
 app.command("sweep")(sweep.sweep)
+app.command("sensitivity")(sensitivity.sensitivity)
 app.command("figures")(figures.figures)
 app.command("tune")(tune.tune)
 app.command("table")(figures.table)

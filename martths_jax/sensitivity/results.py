@@ -1,0 +1,229 @@
+"""`Sensitivity`: Sobol' indices of all outputs, their file, table and summary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from martths_jax.errors import InputError
+from martths_jax.indices import NAMES
+from martths_jax.sensitivity.design import Design
+from martths_jax.sensitivity.estimators import LEVEL, RESAMPLES, SobolIndices, sobol, verdicts
+from martths_jax.sensitivity.store import ROWS
+from martths_jax.study.dataset import attributes, read_dataset, save_dataset
+from martths_jax.study.export import _quoted
+from martths_jax.study.files import write_text, writing
+from martths_jax.study.plan import Plan
+from martths_jax.study.store import RunFolder
+from martths_jax.study.summary import Summary, Table
+from martths_jax.watch import Status
+
+ESTIMATES = ("first", "first_low", "first_high", "total", "total_low", "total_high")
+_WORDS = {
+    "first": "first-order Sobol' index",
+    "total": "total Sobol' index",
+    "low": "lower end of its confidence interval",
+    "high": "upper end of its confidence interval",
+}
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Results of a global sensitivity analysis.
+
+    Attributes:
+        dataset: as in ``sensitivity.nc``: ``first``, ``total`` and the ends of their intervals
+            (controller, index, factor), ``note`` (controller, index), and the runs themselves.
+        folder: of the analysis.
+    """
+
+    dataset: xr.Dataset
+    folder: Path
+
+    @property
+    def notes(self) -> dict[tuple[str, str], str]:
+        """Sentence about each (controller, index) whose Sobol' indices mean little."""
+        note = self.dataset.note
+        return {
+            (str(c), str(n)): str(note.sel(controller=c, index=n).values)
+            for c in note.controller.values
+            for n in note["index"].values
+            if str(note.sel(controller=c, index=n).values)
+        }
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should read before the numbers."""
+        found = []
+        N = self.dataset.sizes["sample"]
+        for controller in self.dataset.controller.values:
+            used = int(self.dataset.used.sel(controller=controller))
+            if used < N:
+                found.append(
+                    f"{controller}: {N - used} of {N} base samples hold a run that was lost and "
+                    "are left out; the indices are those of the plants that finish."
+                )
+        grouped: dict[tuple[str, str], list[str]] = {}
+        for (controller, name), text in self.notes.items():
+            kind = text.split(":")[0].split(";")[0]
+            grouped.setdefault((controller, kind), []).append(name)
+        for (controller, kind), names in grouped.items():
+            found.append(f"{controller}: {', '.join(names)}: {kind}.")
+        return found
+
+    def summary(self) -> Summary:
+        """Total and first-order indices as tables."""
+        return summarise(self)
+
+    def __str__(self) -> str:
+        sizes = self.dataset.sizes
+        return (
+            f"Sensitivity in {self.folder}: N = {sizes['sample']}, {sizes['factor']} factors, "
+            f"{sizes['controller']} controllers"
+        )
+
+
+def open_sensitivity(folder: str | Path) -> Sensitivity:
+    """A finished analysis from its folder.
+
+    Raises:
+        InputError: if there is none, or it is of another version.
+    """
+    path = Path(folder) / "sensitivity.nc"
+    if not path.is_file():
+        raise InputError(f"{path} does not exist; give the folder of a finished analysis.")
+    return Sensitivity(read_dataset(path), Path(folder))
+
+
+def write_results(run: RunFolder, design: Design, plan: Plan) -> Sensitivity:
+    """``sensitivity.nc``, ``sensitivity.csv`` and ``summary.md``."""
+    done = Sensitivity(assemble(run, design, plan), run.path)
+    save_dataset(done.dataset, run.path / "sensitivity.nc")
+    write_csv(done, run.path / "sensitivity.csv")
+    write_text(run.path / "summary.md", done.summary().markdown())
+    return done
+
+
+def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
+    """Runs and Sobol' indices of a complete analysis."""
+    names = list(plan.controllers)
+    shape = design.unit.shape[:2]
+    outcomes = [run.read(c, ROWS) for c in names]
+    value = np.stack([o.value.reshape(*shape, -1) for o in outcomes])
+    status = np.stack([o.status.reshape(shape) for o in outcomes])
+    found = [sobol(v, seed=plan.config.seed) for v in value]
+    notes = [list(verdicts(NAMES, f, design.samples).values()) for f in found]
+    cell = ("controller", "index", "factor")
+    variables = {
+        name: (cell, np.stack([getattr(f, name) for f in found]), {
+            "long_name": f"{_WORDS[name.split('_')[0]]}"
+            + (f": {_WORDS[name.split('_')[1]]}" if "_" in name else ""), "units": "1"})
+        for name in ESTIMATES
+    } | {
+        "mean": (cell[:2], np.stack([f.mean for f in found]), {"long_name": "mean of the index"}),
+        "deviation": (cell[:2], np.stack([f.deviation for f in found]), {
+            "long_name": "standard deviation of the index"}),
+        "used": ("controller", np.array([f.used for f in found], dtype=np.int32), {
+            "long_name": "base samples whose runs all finished"}),
+        "note": (cell[:2], np.array(notes), {"long_name": "what limits these indices"}),
+        "value": (("controller", "sample", "row", "index"), value, {
+            "long_name": "evaluation indices of every run; NaN where it diverged",
+            "units": "ms for J1 and J4 (positive = late), percent for the others"}),
+        "status": (("controller", "sample", "row"), status, {
+            "long_name": "how the run ended",
+            "flag_values": np.array([int(s) for s in Status], dtype=np.int32),
+            "flag_meanings": " ".join(s.name.lower() for s in Status)}),
+        "point": (("sample", "row", "factor"), design.unit, {
+            "long_name": "points of the design in the unit cube", "units": "1"}),
+    }  # fmt: skip
+    coordinates = {
+        "controller": np.array(names),
+        "index": np.array(NAMES),
+        "factor": np.array(design.factors),
+        "row": np.array(["A", "B", *(f"AB {f}" for f in design.factors)]),
+        "sample": np.arange(design.samples, dtype=np.int32),
+    }
+    about = attributes(run) | {
+        "title": "Virtual multi-axial real-time hybrid simulation: global sensitivity",
+        "confidence": f"{LEVEL:g}, percentile bootstrap, {RESAMPLES} resamples of base samples",
+        "base_samples": design.samples,
+    }
+    about["trials"] = design.samples
+    return xr.Dataset(variables, coordinates, about)
+
+
+def indices_of(sensitivity: Sensitivity, controller: str) -> SobolIndices:
+    """The Sobol' indices of a controller as arrays (index, factor)."""
+    cell = sensitivity.dataset.sel(controller=controller)
+    order = ("first", "total", "first_low", "first_high", "total_low", "total_high")
+    columns = [cell[name].values for name in order]
+    return SobolIndices(*columns, cell["mean"].values, cell.deviation.values, int(cell.used))
+
+
+def write_csv(found: Sensitivity, path: Path) -> None:
+    """One row a controller, index and factor; empty where the index does not vary."""
+    data = found.dataset
+    with writing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        file.write(",".join(["controller", "index", "factor", *ESTIMATES, "note"]) + "\n")
+        for c, controller in enumerate(data.controller.values):
+            for i, name in enumerate(data["index"].values):
+                for j, factor in enumerate(data.factor.values):
+                    numbers = [float(data[e].values[c, i, j]) for e in ESTIMATES]
+                    cells = ",".join("" if x != x else repr(x) for x in numbers)
+                    note = _quoted(str(data.note.values[c, i]))
+                    start = ",".join(map(_quoted, (str(controller), str(name), str(factor))))
+                    file.write(f"{start},{cells},{note}\n")
+
+
+def summarise(found: Sensitivity) -> Summary:
+    """Tables of total and of first-order indices, and what limits them."""
+    data = found.dataset
+    factors = [str(f) for f in data.factor.values]
+    tables = []
+    for controller in data.controller.values:
+        one = indices_of(found, controller)
+        for title, value, low, high in (
+            ("Total", one.total, one.total_low, one.total_high),
+            ("First-order", one.first, one.first_low, one.first_high),
+        ):
+            rows = [
+                (name, *(_cell(*x) for x in zip(value[i], low[i], high[i], strict=True)))
+                for i, name in enumerate(NAMES)
+            ]
+            note = (
+                f"In brackets: {LEVEL:.0%} bootstrap confidence intervals, {one.used} of "
+                f"{data.sizes['sample']} base samples."
+            )
+            title = f"{title} Sobol' indices, {controller}"
+            tables.append(Table(title, ("index", *factors), rows, (note,)))
+        rows = [(n, text) for (c, n), text in found.notes.items() if c == controller]
+        if rows:
+            tables.append(Table(f"What limits them, {controller}", ("index", "note"), rows))
+    heading = (
+        f"Global sensitivity: N = {data.sizes['sample']} base samples, {len(factors)} factors, "
+        f"{data.sizes['sample'] * data.sizes['row']} runs a controller, seed {data.attrs['seed']}"
+    )
+    return Summary(heading, tables)
+
+
+def leading(found: Sensitivity, controller: str, most: int = 3) -> Table:
+    """For each index the factors with the largest total indices: a table for the screen."""
+    one, rows = indices_of(found, controller), []
+    factors = found.dataset.factor.values
+    for i, name in enumerate(NAMES):
+        note = found.notes.get((controller, name), "")
+        order = np.argsort(-one.total[i])[:most] if one.varies[i] else []
+        cells = [
+            f"{factors[j]} {_cell(one.total[i, j], one.total_low[i, j], one.total_high[i, j])}"
+            for j in order
+        ]
+        rows.append((name, *cells, *[""] * (most - len(cells)), note.split(":")[0]))
+    heads = ("index", *(f"{n}." for n in range(1, most + 1)), "note")
+    return Table(f"Largest total Sobol' indices, {controller}", heads, rows)
+
+
+def _cell(value: float, low: float, high: float) -> str:
+    return "–" if np.isnan(value) else f"{value:.2f} [{low:.2f}, {high:.2f}]"
