@@ -12,6 +12,7 @@ import xarray as xr
 
 from martths_jax.errors import InputError
 from martths_jax.indices import NAMES
+from martths_jax.plant import PARAMETERS
 from martths_jax.study.dataset import attributes, read_dataset, save_dataset
 from martths_jax.study.engine import FIRSTS
 from martths_jax.study.export import _quoted
@@ -144,6 +145,10 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
             "long_name": "largest valve command", "units": "V"}),
     }  # fmt: skip
+    variables["draw"] = (("trial", "parameter"), run.draws().plants(
+        np.arange(run.trials + 1)).draws, {
+            "long_name": "standard normal draws of the plant, before any spread", "units": "1"},
+    )  # fmt: skip
     for i, name in enumerate(FIRSTS):
         variables[f"first_{name}"] = ((*cell, "actuator"), gather(lambda o, i=i: o.first[:, i]), {
             "long_name": f"first sample of `{name}` (see Watch); NaN = never",
@@ -161,6 +166,7 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         "trial": np.arange(run.trials + 1, dtype=np.int32),
         "index": np.array(NAMES),
         "actuator": np.array([1, 2], dtype=np.int32),
+        "parameter": np.array(PARAMETERS),
     }  # fmt: skip
     about = attributes(run) | {
         "title": "Virtual multi-axial real-time hybrid simulation: sweep",
