@@ -10,7 +10,6 @@ import numpy as np
 from martths_jax.figures.style import (
     BLUE,
     DOUBLE,
-    VERMILLION,
     Drawing,
     controller_label,
     house_style,
@@ -59,17 +58,18 @@ def tornado(found: Sensitivity, controller: str, shown: Sequence[str]) -> Drawin
             continue
         order = np.argsort(one.total[i])
         places = np.arange(order.size)
-        for value, low, high, colour, height, label in (
-            (one.total, one.total_low, one.total_high, "#B9D3E3", 0.8, "total"),
-            (one.first, one.first_low, one.first_high, BLUE, 0.4, "first order"),
+        for value, low, high, colour, shift, label in (
+            (one.total, one.total_low, one.total_high, "#B9D3E3", 0.19, "total"),
+            (one.first, one.first_low, one.first_high, BLUE, -0.19, "first order"),
         ):
             x = value[i, order]
             error = np.maximum([x - low[i, order], high[i, order] - x], 0)
-            panel.barh(places, np.maximum(x, 0), height=height, color=colour, label=label)
-            panel.errorbar(x, places, xerr=error, fmt="none", lw=0.7, capsize=1.3, capthick=0.7,
-                           ecolor=VERMILLION if label == "total" else "k")  # fmt: skip
+            panel.barh(places + shift, x, height=0.38, color=colour, label=label)
+            panel.errorbar(x, places + shift, xerr=error, fmt="none", lw=0.7, capsize=1.2,
+                           capthick=0.7, ecolor="k")  # fmt: skip
         panel.set_yticks(places, [factors[j] for j in order], fontsize=6)
-        panel.set_xlim(min(0.0, panel.dataLim.x0), max(1.0, float(one.total_high[i].max())))
+        ends = (one.first_low[i], one.total_high[i], one.first_high[i])
+        panel.set_xlim(min(0.0, float(ends[0].min())), max(1.0, *(float(e.max()) for e in ends)))
         panel.grid(axis="y", visible=False)
         for j in order[::-1]:
             cells = (name, factors[j], one.total[i, j], one.total_low[i, j], one.total_high[i, j],
