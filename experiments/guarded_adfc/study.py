@@ -82,6 +82,12 @@ def main(table):
         runs = [(CHOSEN, chosen, m, s, {}) for s in range(1, 6) for m in MOTIONS]
     else:
         runs = [(n, chosen, m, 1, c) for n, c in CONDITIONS.items() for m in MOTIONS]
+        # What the literal controller does where the default misses its goal.
+        runs += [
+            (f"{n}, literal", CANDIDATES["literal"], m, 1, CONDITIONS[n])
+            for n in ("motion scale 0.1", "plant uncertainty x 2")
+            for m in MOTIONS
+        ]
     write(table, runs)
 
 
