@@ -15,6 +15,7 @@ import jax
 import numpy as np
 
 from martths_jax import Benchmark, SensorNoise, build_benchmark
+from martths_jax.benchmark import command_volts
 from martths_jax.coupler import actuator_to_frame
 from martths_jax.indices import DELAYS, NAMES, PAIRS
 from martths_jax.simulation import reference_response
@@ -120,7 +121,8 @@ class LinearLoop:
             L: (8, 2) filter gain.
 
         Returns:
-            mapping of the 24 (delays in whole samples, as printed), (records, 4) delays in samples.
+            mapping of the 24 (delays in whole samples, as printed), (records, 4) delays in samples,
+            (records, 2) largest valve commands [V].
         """
         A, B, C = self.plant_dense
         K_z, K_e = K[:, :8], K[:, 8:]
@@ -142,28 +144,30 @@ class LinearLoop:
         loop = inverse(I - back @ hat_a)
         a_g = loop @ (self.J_inverse @ self.ground_to_num[:, :2])
         a_w = loop @ (back @ (hat_w @ ones))
-        all_g = self._outputs(a_g, 0.0, T, S, hat_a, hat_w, 1.0)
-        all_g = self.every_bin(all_g)
-        all_w = self._outputs(a_w, ones, T, S, hat_a, hat_w, 0.0)
-        all_w = self.every_bin(all_w)
-        rows, delays = [], []
+        U = U_m, U_a
+        all_g = self.every_bin(self._outputs(a_g, 0.0, T, S, hat_a, hat_w, U, 1.0))
+        all_w = self.every_bin(self._outputs(a_w, ones, T, S, hat_a, hat_w, U, 0.0))
+        rows, delays, volts = [], [], []
         for samples, ground, noise, reference in self.records:
             X = all_g * ground[:, None] + all_w * noise[:, None]
             x = self.signal(X)[:samples]
-            row, delay = evaluate(self.J, x, reference, self.benchmark.fs)
+            row, delay = evaluate(self.J, x[:, :12], reference, self.benchmark.fs)
             rows.append(row)
             delays.append(delay)
-        return dict(zip(NAMES, np.mean(rows, axis=0), strict=True)), np.array(delays)
+            volts.append(np.abs(np.asarray(command_volts(x[:, 12:].T))).max(axis=1))
+        mean = dict(zip(NAMES, np.mean(rows, axis=0), strict=True))
+        return mean, np.array(delays), np.array(volts)
 
-    def _outputs(self, x_a, w, T, S, hat_a, hat_w, ground):
-        """(F, 12): x_a, x_m, x_hat, num as transfer functions of one scalar input."""
+    def _outputs(self, x_a, w, T, S, hat_a, hat_w, U, ground):
+        """(F, 14): x_a, x_m, x_hat, num, u as transfer functions of one scalar input."""
         x_m, hat = T @ x_a, hat_a @ x_a
         if np.ndim(w):
             x_m, hat = x_m + S @ w, hat + hat_w @ w
         num = self.force_to_num @ hat
         if ground:
             num = num + self.ground_to_num
-        return np.concatenate([x_a, x_m, hat, num], axis=1)[:, :, 0]
+        command = U[0] @ x_m + U[1] @ x_a
+        return np.concatenate([x_a, x_m, hat, num, command], axis=1)[:, :, 0]
 
 
 def evaluate(J, x, reference, fs):

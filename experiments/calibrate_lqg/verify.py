@@ -3,7 +3,8 @@
     python experiments/calibrate_lqg/verify.py --records DIR
 
 Reads results/search.json, writes results/table.csv and prints it with the root-mean-square log
-deviations.  ``check`` are the weights that ``LQG.design`` had before.
+deviations.  ``check`` are the weights that ``LQG.design`` had before, ``default`` is what it has;
+``unlimited`` is ``published`` searched with --volts inf.
 """
 
 from __future__ import annotations
@@ -30,13 +31,15 @@ def main() -> None:
     records = parser.parse_args().records
     found = json.loads((RESULTS / "search.json").read_text())
     plant = dense_nominal(build_benchmark())
-    points = {"check": ("published", START["published"])}
+    points = {"check": ("published", START)}
     points |= {name: (name, np.array(f["parameters"])) for name, f in found.items()}
     controllers = {}
     for name, (design, x) in points.items():
+        design = "published" if design == "unlimited" else design
         if design == "gains":
             to_gains(plant, np.array(found["full"]["parameters"]))
         controllers[name] = controller(plant.benchmark, *DESIGNS[design](plant, x))
+    controllers["default"] = LQG.design(plant.benchmark).prepare(plant.benchmark)
     table = run(plant.benchmark, controllers, records)
     with (RESULTS / "table.csv").open("w", newline="") as file:
         writer = csv.writer(file)
