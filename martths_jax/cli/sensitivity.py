@@ -22,18 +22,22 @@ from martths_jax.sweep.config import SHOWN
 def sensitivity(
     trials: Annotated[
         int | None,
-        typer.Option("--trials", help="Base samples N, a power of two; N (d + 2) runs [256]."),
+        typer.Option(
+            "--trials", help="Base samples N, a power of two; N (d + 2) runs; 256 if left out."
+        ),
     ] = None,
     config: Annotated[
         Path | None, typer.Option("--config", help="TOML file of a study; flags override it.")
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Seed of the design [1].")] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", help="Seed of the design; 1 if left out.")
+    ] = None,
     controllers: Annotated[
         list[str] | None,
         typer.Option(
             "--controllers",
             "--controller",
-            help="Controllers, separated by commas or repeated [adfc].",
+            help="Controllers, separated by commas or repeated; adfc if left out.",
         ),
     ] = None,
     motions: Motions = None,
@@ -48,17 +52,19 @@ def sensitivity(
     resample: Resample = None,
     index: Annotated[
         list[str] | None,
-        typer.Option("--index", help=f"Indices of the tornado chart [{','.join(SHOWN)}]."),
+        typer.Option(
+            "--index", help=f"Indices of the tornado chart; {','.join(SHOWN)} if left out."
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder of the results [sensitivity].")
+        Path | None, typer.Option("--out", help="Folder of the results; sensitivity if left out.")
     ] = None,
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Start over: delete the analysis in the folder.")
     ] = False,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
     devices: Annotated[
-        int | None, typer.Option("--devices", help="Devices to use [all: one a core].")
+        int | None, typer.Option("--devices", help="Devices to use; all, one a core, if left out.")
     ] = None,
     memory_gb: Annotated[
         float | None, typer.Option("--memory", help="Bound on the memory of the noise [GB].")

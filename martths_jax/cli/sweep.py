@@ -52,14 +52,18 @@ def sweep(
     config: Annotated[
         Path | None, typer.Option("--config", help="TOML file of a study; flags override it.")
     ] = None,
-    trials: Annotated[int | None, typer.Option("--trials", help="Uncertain plants [200].")] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Seed of all draws [1].")] = None,
+    trials: Annotated[
+        int | None, typer.Option("--trials", help="Uncertain plants; 200 if left out.")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", help="Seed of all draws; 1 if left out.")
+    ] = None,
     controllers: Annotated[
         list[str] | None,
         typer.Option(
             "--controllers",
             "--controller",
-            help="Controllers, separated by commas or repeated [adfc].",
+            help="Controllers, separated by commas or repeated; adfc if left out.",
         ),
     ] = None,
     motions: Motions = None,
@@ -74,17 +78,19 @@ def sweep(
     resample: Resample = None,
     index: Annotated[
         list[str] | None,
-        typer.Option("--index", help=f"Indices of figures and summary [{','.join(SHOWN)}]."),
+        typer.Option(
+            "--index", help=f"Indices of figures and summary; {','.join(SHOWN)} if left out."
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder of the results [sweep].")
+        Path | None, typer.Option("--out", help="Folder of the results; sweep if left out.")
     ] = None,
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Start over: delete the sweep in the folder.")
     ] = False,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
     devices: Annotated[
-        int | None, typer.Option("--devices", help="Devices to use [all: one a core].")
+        int | None, typer.Option("--devices", help="Devices to use; all, one a core, if left out.")
     ] = None,
     memory_gb: Annotated[
         float | None, typer.Option("--memory", help="Bound on the memory of the noise [GB].")

@@ -50,11 +50,11 @@ def _at_least(low: float) -> Callable[[float], bool]:
 
 
 SCALARS = {
-    "nb": Scalar("nb", _at_least(9), "be a whole number of at least 9 (8 unknowns)", "samples",
+    "nb": Scalar("nb", _at_least(9), "be a whole number of at least 9", "samples",
                  "buffer length Nb", whole=True),
     "no": Scalar("no", _at_least(0), "be a whole number of at least 0", "samples",
                  "overlap No", whole=True),
-    "no_fraction": Scalar("no", _between(0, 1), "lie in [0, 1]", "1", "overlap No / Nb"),
+    "no_fraction": Scalar("no", _between(0, 1), "lie between 0 and 1", "1", "overlap No / Nb"),
     "hop": Scalar("no", _at_least(1), "be a whole number of at least 1", "samples",
                   "hop Nb - No", whole=True),
     "fb": Scalar("no", is_positive, "be positive", "Hz", "update rate f_b"),
@@ -168,27 +168,28 @@ def axis_values(name: str, given) -> tuple[float, ...]:
     """The values of an axis, each of the kind its scalar has.
 
     Raises:
-        InputError: naming every value that cannot be used, an empty list or a value given twice.
+        InputError: naming every value that cannot be used or is given twice, or an empty list.
     """
     values = _parse(name, given) if isinstance(given, str) else np.ravel(given).tolist()
     scalar = SCALARS[name]
     if not values:
         raise InputError(f"Axis `{name}` has no values; give at least one.")
     bad = [v for v in values if not scalar.good(v) or (scalar.whole and v != int(v))]
-    if bad:
-        raise InputError(
-            f"Values of axis `{name}` must {scalar.wanted}"
-            f"{'' if scalar.unit == '1' else f' [{scalar.unit}]'}, but got "
-            f"{', '.join(f'{v:g}' if is_number(v) else repr(v) for v in bad)}."
-        )
-    values = [int(v) if scalar.whole else float(v) for v in values]
     twice = sorted({v for v in values if values.count(v) > 1})
+    problems = []
+    if bad:
+        # Parentheses, since square brackets are markup on a terminal.
+        unit = "" if scalar.unit == "1" else f" ({scalar.unit})"
+        given = ", ".join(f"{v:g}" if is_number(v) else repr(v) for v in bad)
+        problems.append(f"Values of axis `{name}` must {scalar.wanted}{unit}, but got {given}.")
     if twice:
-        raise InputError(
+        problems.append(
             f"Axis `{name}` has {', '.join(f'{v:g}' for v in twice)} more than once; "
             "every value makes cells of its own."
         )
-    return tuple(values)
+    if problems:
+        raise InputError("  ".join(problems))
+    return tuple(int(v) if scalar.whole else float(v) for v in values)
 
 
 def _parse(name: str, text: str) -> list[float]:
