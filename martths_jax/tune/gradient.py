@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 
 import jax
 import jax.numpy as jnp
@@ -13,6 +14,7 @@ from jax.sharding import PartitionSpec as P
 from martths_jax import loop
 from martths_jax import watch as watching
 from martths_jax.benchmark import Benchmark
+from martths_jax.errors import argument_error
 from martths_jax.motions import Motion
 from martths_jax.plant import Plants
 from martths_jax.sensors import SensorNoise
@@ -54,7 +56,7 @@ class Gradient:
         devices = jax.local_devices()[: math.gcd(trials, jax.local_device_count())]
         lags = lag_range(0, fs) if objective.needs_delays else (1, 1)
 
-        def value(logs, plants, ground, reference, noise):
+        def value(logs, weights, plants, ground, reference, noise):
             ready = build(controller, benchmark, logs)
             sums, watch, _, peaks = loop.run(
                 benchmark,
@@ -68,7 +70,7 @@ class Gradient:
                 segment=segment_length(ground.shape[0], ready.window or loop.WINDOW),
                 tally=objective.tally,
             )
-            loss, smooth = objective.evaluate(sums, watch, peaks)
+            loss, smooth = objective.evaluate(sums, watch, peaks, weights)
             lost = watching.status_of(watch) >= Status.DIVERGED
             return jnp.mean(loss), (jax.tree.map(jnp.mean, smooth), jnp.mean(lost.astype(float)))
 
@@ -80,6 +82,7 @@ class Gradient:
             local,
             mesh=Mesh(np.array(devices), ("trials",)),
             in_specs=(
+                P(),
                 P(),
                 jax.tree.map(lambda x: P("trials") if jnp.ndim(x) else P(), plants),
                 P(),
@@ -98,10 +101,25 @@ class Gradient:
             drawn = draw_noise(noise, jnp.asarray(plants.trial), ground.shape[0], fs)
             self.inputs.append((ground, reference, drawn))
 
+    def of(self, objective: Objective) -> Gradient:
+        """The gradient of an objective with the same indices and other weights, not compiled anew.
+
+        Raises:
+            InputError: if the indices or the penalty are others.
+        """
+        if objective.shape != self.objective.shape:
+            raise argument_error(
+                "gradient", f"be of an objective of {objective.names}", self.objective.names
+            )
+        other = copy(self)
+        other.objective = objective
+        return other
+
     def __call__(self, logs) -> tuple[float, dict[str, float], dict[str, float], float]:
         """At log-numbers: objective, gradient, smooth indices, share of trials that diverged."""
         logs = {name: jnp.asarray(value, dtype=float) for name, value in logs.items()}
-        outcomes = [self.program(logs, self.plants, *each) for each in self.inputs]
+        weights = self.objective.weights
+        outcomes = [self.program(logs, weights, self.plants, *each) for each in self.inputs]
         mean = lambda *x: float(np.mean([np.mean(np.asarray(v)) for v in x]))  # noqa: E731
         (loss, (smooth, lost)), slope = jax.tree.map(mean, *outcomes)
         return loss, slope, smooth, lost

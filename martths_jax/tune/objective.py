@@ -101,6 +101,16 @@ class Objective:
         return tuple(dict.fromkeys(name for _, name in self.terms))
 
     @property
+    def weights(self) -> jax.Array:
+        """Weight of each of ``names``."""
+        return jnp.array([sum(w for w, n in self.terms if n == name) for name in self.names])
+
+    @property
+    def shape(self) -> tuple:
+        """What a compiled program of it depends on: everything but the weights."""
+        return self.names, self.volt_limit, self.penalty
+
+    @property
     def tally(self) -> PeakTally | None:
         """The running sums it needs besides those of every run."""
         return PeakTally() if set(self.names) & set(PEAKS) else None
@@ -110,15 +120,23 @@ class Objective:
         """Whether cross-correlations are needed."""
         return bool(set(self.names) & set(DELAYS))
 
-    def evaluate(self, sums: IndexSums, watch: Watch, peaks) -> tuple[jax.Array, dict]:
-        """Smooth objective of each trial (T,) and the smooth indices it is made of (T,)."""
+    def evaluate(
+        self, sums: IndexSums, watch: Watch, peaks, weights: jax.Array | None = None
+    ) -> tuple[jax.Array, dict]:
+        """Smooth objective of each trial (T,) and the smooth indices it is made of (T,).
+
+        Args:
+            sums, watch, peaks: of ``loop.run`` with ``tally``.
+            weights: in place of ``self.weights``; may be traced.
+        """
+        weights = self.weights if weights is None else weights
         smooth = indices_of(sums, interpolate=True)
         if peaks is not None:
             error, target = (jnp.maximum(x, 1e-300) ** (1 / POWER) for x in peaks)
             smooth |= dict(zip(PEAKS, 100 * error / target, strict=True))
         smooth = {name: smooth[name] for name in self.names}
         over = jnp.maximum(watch.volt_peak - self.volt_limit, 0.0)
-        loss = sum(weight * jnp.abs(smooth[name]) for weight, name in self.terms)
+        loss = sum(w * jnp.abs(smooth[name]) for w, name in zip(weights, self.names, strict=True))
         return loss + self.penalty * jnp.sum(over**2, axis=0), smooth
 
 

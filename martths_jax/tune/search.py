@@ -88,6 +88,7 @@ def tune(
     folder: Path,
     *,
     tell: Callable[[dict], None] = lambda row: None,
+    gradient: Gradient | None = None,
 ) -> dict:
     """Minimise the objective; keeps ``state.json`` in `folder` after each step and goes on from it.
 
@@ -95,6 +96,8 @@ def tune(
         motions: what to tune on.
         folder: where the state is kept; a folder with the state of other options is refused.
         tell: called with each row of the history.
+        gradient: of the same plants and motions with other weights of the same indices, which
+            saves compiling one.
 
     Returns:
         the state: ``start``, ``best`` (log10 of the numbers), ``history`` (rows), ``ended``.
@@ -115,9 +118,11 @@ def tune(
             "moments": _leaves(blank), "length": options.rate, "history": [], "ended": "",
         }  # fmt: skip
     plants = draw_plants(options.plants, options.seed)
-    gradient = Gradient(
-        benchmark, options.controller, objective, plants, motions, SensorNoise(seed=options.seed)
-    )
+    if gradient is None:
+        noise = SensorNoise(seed=options.seed)
+        gradient = Gradient(benchmark, options.controller, objective, plants, motions, noise)
+    else:
+        gradient = gradient.of(objective)
     template = jax.tree.structure(optimiser.init({name: jnp.zeros(()) for name in free}))
     while not state["ended"] and len(state["history"]) < options.steps:
         loss, slope, smooth, lost = gradient(state["trial"])

@@ -13,6 +13,7 @@ from martths_jax.simulation import reference_response
 from martths_jax.tune import Options, tune
 from martths_jax.tune import search as searching
 from martths_jax.tune.objective import Objective
+from tests.tune.bowl import Bowl
 
 
 @pytest.fixture(scope="module")
@@ -60,22 +61,6 @@ def test_gradient_through_checkpointed_segments(benchmark, motion, kind):
     forward = jax.jit(lambda x, d: jax.jvp(lambda y: value(y, 0), (x,), (d,))[1])
     both = forward(points[0], jnp.array([1.0, 1.0]))
     assert float(both) == pytest.approx(float(jnp.sum(reverse)), rel=1e-7)
-
-
-class Bowl:
-    """In place of the simulation: a quadratic objective, unstable beyond a wall."""
-
-    wall = np.inf
-
-    def __init__(self, *_):
-        pass
-
-    def __call__(self, logs):
-        x = {name: float(value) for name, value in logs.items()}
-        lost = float(x["pull"] > self.wall)
-        slope = {"pull": 2 * (x["pull"] + 3), "q": 2 * (x["q"] + 4)}
-        loss = (x["pull"] + 3) ** 2 + (x["q"] + 4) ** 2
-        return (np.nan if lost else loss), slope, {"J2_1": loss}, lost
 
 
 @pytest.fixture

@@ -1,0 +1,73 @@
+"""``martths tune`` as a user types it: one clear sentence for each mistake."""
+
+import numpy as np
+import pytest
+
+from martths_jax.cli import main
+from martths_jax.tune import search as searching
+from tests.tune.bowl import Bowl
+
+
+def said(capsys, monkeypatch, *words):
+    """Exit code and the error text of ``martths tune`` with these words, on one line."""
+    monkeypatch.setattr("sys.argv", ["martths", "tune", *map(str, words)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    return end.value.code, " ".join(capsys.readouterr().err.split())
+
+
+@pytest.fixture
+def short_motion(tmp_path):
+    """A quarter of a second of ground acceleration as a file."""
+    path = tmp_path / "short.csv"
+    time = np.arange(256) / 1024
+    rows = np.column_stack([time, np.sin(20 * time)])
+    np.savetxt(path, rows, delimiter=",", header="time [s],acceleration [m/s^2]", comments="")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--objective", "j2+j11"), "`objective` must be a sum of weighted indices"),
+        (("--objective", "j2+0*j5"), "positive weight on J5, but got 0"),
+        (("--objective", "j2+-1*j5"), "positive weight on J5, but got -1"),
+        (("--start", "e1=0"), "`start` must give a positive e1, but got 0"),
+        (("--start", "e1=-3"), "`start` must give a positive e1, but got -3"),
+        (("--start", "e1"), "must be NAME=VALUE, but got 'e1'"),
+        (("--start", "pull=1e-5"), "`start` must name one of e1, e2, r2, y1, y2, q"),
+        (("--controller", "adfc", "--start", "pull=0"), "give a positive pull"),
+        (("--plants", 0), "`plants` must be at least 1, but got 0"),
+        (("--steps", 0), "`steps` must be at least 1, but got 0"),
+        (("--fresh-plants", 0), "--fresh-plants must be at least 1, but got 0"),
+        (("--controller", "pid"), "`controller` must be one of ['adfc', 'lqg'], but got 'pid'"),
+        (("--check", "elcentro-like"), "a motion that is not tuned on"),
+    ],
+)
+def test_a_mistake_is_one_sentence(words, sentence, capsys, monkeypatch, tmp_path):
+    code, text = said(capsys, monkeypatch, "--out", tmp_path / "out", *words)
+    assert code == 2
+    assert sentence in text
+    assert "Traceback" not in text
+    assert not (tmp_path / "out").exists()
+
+
+def test_several_mistakes_are_told_at_once(capsys, monkeypatch, tmp_path):
+    words = ("--out", tmp_path, "--plants", 0, "--objective", "j99", "--start", "q=-1")
+    _, text = said(capsys, monkeypatch, *words)
+    for part in ("`plants`", "'j99'", "positive q"):
+        assert part in text
+
+
+def test_an_unstable_start_is_one_sentence(capsys, monkeypatch, tmp_path, short_motion):
+    monkeypatch.setattr(searching, "Gradient", Bowl)
+    monkeypatch.setattr(Bowl, "wall", -6.0)
+    other = tmp_path / "other.csv"
+    other.write_bytes(short_motion.read_bytes())
+    code, text = said(
+        capsys, monkeypatch, "--controller", "adfc", "--objective", "j2", "--motions", short_motion,
+        "--check", other, "--out", tmp_path / "out",
+    )  # fmt: skip
+    assert code == 2
+    assert "`start` must be stable on every plant, but 100 % of the trials diverged" in text
+    assert "Traceback" not in text
