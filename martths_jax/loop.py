@@ -225,11 +225,21 @@ def run(
     )
     numbers = jnp.arange(windows * length).reshape(windows, length)
     inputs = (numbers, in_windows(ground), in_windows(reference, late=1), in_windows(noise))
-    if samples is None or keep:
+    if samples is None:
         carry, signals = jax.lax.scan(window, carry, inputs)
     else:
-        one = lambda i, so_far: window(so_far, jax.tree.map(lambda x: x[i], inputs))[0]  # noqa: E731
-        carry, signals = jax.lax.fori_loop(0, N // length + 1, one, carry), {}
+        inputs_at = lambda i: jax.tree.map(lambda x: x[i], inputs)  # noqa: E731
+        # What lies beyond the motion's end is left as zeros.
+        shapes = jax.eval_shape(window, carry, inputs_at(0))[1]
+        blank = jax.tree.map(lambda x: jnp.zeros((windows, *x.shape)), shapes)
+
+        def one(i, so_far):
+            carry, signals = so_far
+            carry, new = window(carry, inputs_at(i))
+            put = jax.lax.dynamic_update_index_in_dim
+            return carry, jax.tree.map(lambda x, row: put(x, row, i, 0), signals, new)
+
+        carry, signals = jax.lax.fori_loop(0, N // length + 1, one, (carry, blank))
 
     _, ((_, _, sums, watch, extra), tail, correlation) = carry
     # The last `lead` samples still wait for targets that come after them: none do.

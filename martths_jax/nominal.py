@@ -62,22 +62,25 @@ class Comparison:
         writer.writerows(rows)
         return text.getvalue()
 
-    def to_markdown(self) -> str:
-        """A table like the published one, with deviations."""
-        names = list(self.ours)
+    def cells(self) -> dict[str, list[str]]:
+        """Of each index, what its row shows: ours, published and deviation by controller."""
+        found: dict[str, list[str]] = {index: [] for index in NAMES}
         rows = {(r["controller"], r["index"]): r for r in self.rows()}
-        head = "| index | " + " | ".join(f"{n} | {n} paper | deviation" for n in names) + " |"
-        lines = [head, "|---|" + "---:|" * (3 * len(names))]
-        for index in NAMES:
-            cells = []
-            for name in names:
+        for index, cells in found.items():
+            for name in self.ours:
                 r = rows[name, index]
                 cells += [
                     f"{r['martths_jax']:.2f}",
                     f"{r['published']:g}",
                     f"{r['deviation_percent']:+.1f} %",
                 ]
-            lines.append(f"| {index} | " + " | ".join(cells) + " |")
+        return found
+
+    def to_markdown(self) -> str:
+        """A table like the published one, with deviations."""
+        head = "| index | " + " | ".join(f"{n} | {n} paper | deviation" for n in self.ours) + " |"
+        lines = [head, "|---|" + "---:|" * (3 * len(self.ours))]
+        lines += [f"| {index} | " + " | ".join(row) + " |" for index, row in self.cells().items()]
         return "\n".join(lines) + "\n"
 
 

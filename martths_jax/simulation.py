@@ -30,6 +30,8 @@ LANES = 64
 #: Motions are padded to a multiple of this, so that records of all usual lengths share a program;
 #: the loop stops where the motion ends [samples].
 ROOM = 2**16
+#: Trials a device that keep their signals, where no more are asked for than these; otherwise all.
+FEW = 8
 #: Ranges of the cross-correlations [samples at 1024 Hz], tried in turn until the peak is inside.
 LAG_RANGES = ((6, 13), (32, 96), (256, 512))
 
@@ -230,7 +232,9 @@ def fill(which: np.ndarray, size: int) -> np.ndarray:
     return np.concatenate([which, np.full(size - which.size, which[0])])
 
 
-def run_block(setup: Setup, plants, noise: jax.Array, which: np.ndarray, devices, keep: bool):
+def run_block(
+    setup: Setup, plants, noise: jax.Array, which: np.ndarray, devices, keep: bool, retry=True
+):
     """Run the trials `which`, with the lag range widened until it holds every delay.
 
     Args:
@@ -238,6 +242,7 @@ def run_block(setup: Setup, plants, noise: jax.Array, which: np.ndarray, devices
         which: positions of the trials in `plants`, at most ``LANES`` a device.
         devices: the devices to spread the block over.
         keep: return signals, trial first.
+        retry: whether to widen the range of lags where a delay is at its end.
     """
     lanes = fill(which, LANES * len(devices))
     leaves, tree = jax.tree.flatten(setup.controller)
@@ -246,10 +251,11 @@ def run_block(setup: Setup, plants, noise: jax.Array, which: np.ndarray, devices
         for x, own in zip(leaves, setup.per_trial, strict=True)
     ]
     controller = jax.tree.unflatten(tree, leaves)
-    kept = min(which.size, LANES) if keep else 0
+    kept = 0 if not keep else FEW if which.size <= FEW else LANES
     own_noise = noise.shape[-1] > 1
     samples = setup.ground.shape[0]
-    room = samples if keep else -(-max(samples, noise.shape[0]) // ROOM) * ROOM
+    # Signals of many trials take memory for all the room there is, so they get no more than needed.
+    room = samples if kept > FEW else -(-max(samples, noise.shape[0]) // ROOM) * ROOM
     ground, reference, noise = (fit(x, room) for x in (setup.ground, setup.reference, noise))
     for attempt in range(controller.first_lag_range, len(LAG_RANGES)):
         lags = lag_range(attempt, setup.benchmark.fs)
@@ -260,9 +266,16 @@ def run_block(setup: Setup, plants, noise: jax.Array, which: np.ndarray, devices
         back = lambda x: np.moveaxis(np.asarray(x)[: which.size], 0, -1)  # noqa: E731
         sums, watch = jax.tree.map(back, (sums, watch))
         lost = np.asarray(watching.status_of(watch)) >= Status.DIVERGED
-        if not np.any(np.asarray(peak_at_edge(sums)) & ~lost):
+        if not (retry and np.any(np.asarray(peak_at_edge(sums)) & ~lost)):
             break
-    return sums, watch, jax.tree.map(lambda x: np.asarray(x)[: which.size], signals)
+    signals = {name: _trial_first(x, samples)[: which.size] for name, x in signals.items()}
+    return sums, watch, signals
+
+
+def _trial_first(signal: jax.Array, samples: int) -> np.ndarray:
+    """(devices, room, ..., kept) as (devices x kept, samples, ...)."""
+    each = np.moveaxis(np.asarray(signal)[:, :samples], -1, 1)
+    return each.reshape(-1, *each.shape[2:])
 
 
 @partial(jax.jit, static_argnums=1)
@@ -273,11 +286,14 @@ def fit(x: jax.Array, length: int) -> jax.Array:
 
 @lru_cache(maxsize=64)
 def compiled(devices: tuple, per_trial: tuple[bool, ...], own_noise: bool, lags, kept: int):
-    """The jitted program of one kind of block; its outputs have the trials first."""
+    """The jitted program of one kind of block.
+
+    Sums and watch come with the trials first, signals (devices, room, ..., kept).
+    """
     mesh = Mesh(np.array(devices), ("trials",))
 
     def local(benchmark, controller, plants, ground, reference, noise, samples):
-        outcome = loop.run(
+        sums, watch, signals, _ = loop.run(
             benchmark,
             controller,
             plants.discretise(benchmark.dt),
@@ -288,8 +304,10 @@ def compiled(devices: tuple, per_trial: tuple[bool, ...], own_noise: bool, lags,
             lags=lags,
             samples=samples,
             keep=kept,
-        )[:3]
-        return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), outcome)
+        )
+        first = lambda x: jnp.moveaxis(x, -1, 0)  # noqa: E731
+        # Signals are too large to be turned round here.
+        return *jax.tree.map(first, (sums, watch)), jax.tree.map(lambda x: x[None], signals)
 
     def program(benchmark, controller, plants, ground, reference, noise, samples):
         leaves, tree = jax.tree.flatten(controller)

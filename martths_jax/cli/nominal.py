@@ -203,15 +203,6 @@ def _print_comparison(found: Comparison) -> None:
     for name in found.ours:
         for title in (name, "paper", "deviation"):
             table.add_column(title, justify="right")
-    rows = {(r["controller"], r["index"]): r for r in found.rows()}
-    for index in published.TABLE4:
-        cells = []
-        for name in found.ours:
-            r = rows[name, index]
-            cells += [
-                f"{r['martths_jax']:.2f}",
-                f"{r['published']:g}",
-                f"{r['deviation_percent']:+.1f} %",
-            ]
+    for index, cells in found.cells().items():
         table.add_row(index, *cells)
     console.print(table)

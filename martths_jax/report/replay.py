@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from martths_jax.errors import InputError
-from martths_jax.study.merge import _engine
+from martths_jax.study.merge import engine_again
 from martths_jax.study.progress import Reporter
 from martths_jax.study.results import Study, open_study
 from martths_jax.study.signals import store_signals
@@ -59,7 +59,7 @@ def replay(
         )
     keep = sorted({trial} | kept_trials(study))
     notices = _Listener(reporter)
-    engine = _engine(RunFolder.open(folder), records, keep, notices)
+    engine = engine_again(RunFolder.open(folder), records, keep, notices)
     if engine is None:
         raise InputError(notices.last.replace("No signals are stored, since the", "The"))
     differing = []

@@ -6,7 +6,9 @@ once and serves every motion and controller.  The numbers are the same to the la
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from functools import partial
 
 import jax
@@ -112,6 +114,21 @@ class Engine:
             response = same.reference if same else reference_response(self.plan.benchmark, ground)
             self.setups[key] = Setup(self.plan.benchmark, ready, own, ground, response)
         return self.setups[key]
+
+    def warm(self, controllers: Iterable[str], trial: np.ndarray) -> None:
+        """Compile the programs of these controllers side by side; `trial`: the first chunk."""
+        motion = self.plan.motions[0].name
+        setups = [self.setup(c, motion) for c in dict.fromkeys(controllers)]
+        noise, which = self.noise(trial)[0], np.arange(min(trial.size, self.block))
+        plants = self.plan.draws.plants(trial)
+
+        def compile_one(setup: Setup) -> None:
+            # A motion of one sample: the programs do not depend on its length.
+            brief = replace(setup, ground=setup.ground[:1], reference=setup.reference[:1])
+            run_block(brief, plants, noise, which, self.devices, keep=False, retry=False)
+
+        with ThreadPoolExecutor(len(setups)) as pool:
+            list(pool.map(compile_one, setups))
 
     def noise(self, trial: np.ndarray) -> list[jax.Array]:
         """Noise of a chunk, block by block, for the longest motion; forgets the chunk before."""

@@ -55,7 +55,7 @@ def merge_runs(
         if share.path.resolve() != out.resolve():
             _copy(share, run)
     raise_all(run.missing(), f"{out} is not complete")
-    engine = _engine(run, records, keep, reporter) if signals else None
+    engine = engine_again(run, records, keep, reporter) if signals else None
     return finish(run, engine, reporter)
 
 
@@ -74,7 +74,7 @@ def _copy(share: RunFolder, run: RunFolder) -> None:
     write_text(run.path / "provenance.json", json.dumps({"sessions": sessions}, indent=1))
 
 
-def _engine(run: RunFolder, records: str | None, keep, reporter: Reporter):
+def engine_again(run: RunFolder, records: str | None, keep, reporter: Reporter):
     """Engine that runs chosen trials again; None, and a notice, where that cannot be done."""
     settings = run.header["config"] | {"out": str(run.path), "keep": tuple(keep)}
     if records is not None:

@@ -193,6 +193,11 @@ def run_chunks(run: RunFolder, engine: Engine, reporter, session, mine: np.ndarr
         cell: Tally(int(mine.sum()), int(mine.sum() - left.sum())) for cell, left in todo.items()
     })  # fmt: skip
     waiting = np.flatnonzero(np.any(list(todo.values()), axis=0))
+    if waiting.size:
+        began = time.monotonic()
+        busy = (c for (c, _), left in todo.items() if left.any())
+        engine.warm(busy, waiting[: engine.chunk])
+        reporter.notice(f"Programs ready after {time.monotonic() - began:.1f} s.")
     warm = set()
     for i in range(0, waiting.size, engine.chunk):
         chunk = waiting[i : i + engine.chunk]

@@ -18,6 +18,7 @@ import numpy as np
 import xarray as xr
 
 from martths_jax.indices import NAMES
+from martths_jax.simulation import FEW
 from martths_jax.study.dataset import read_dataset, write_dataset
 from martths_jax.study.engine import Engine
 from martths_jax.study.files import writing
@@ -26,8 +27,6 @@ from martths_jax.watch import Status
 
 #: The index that ranks trials.
 RANKED_BY = "J2_1"
-#: Most trials whose signals are held in memory at once.
-BATCH = 16
 #: Dimensions and units of the signals, after (kept, time).
 LAYOUT = {
     "x_a": (("actuator",), "mm", "target strokes"),
@@ -82,20 +81,25 @@ def store_signals(engine: Engine, dataset: xr.Dataset, path: Path, keep) -> None
         engine.setup(*cell)  # before the threads start
     about = {k: dataset.attrs[k] for k in ("version_martths_jax", "git_commit", "seed")}
     devices = engine.devices
-    with writing(path) as temporary, ThreadPoolExecutor(len(devices)) as pool:
+    with writing(path) as temporary:
         write_dataset(xr.Dataset(attrs=about | {"format": FORMAT, "label": label}), temporary)
         for motion in dataset.motion.values:
             write_dataset(_shared(engine, motion), temporary, group=group(motion))
-        # A cell a device at a time; written in order, so that the file is reproducible.
-        cells = list(chosen)
-        for i in range(0, len(cells), len(devices)):
-            now = cells[i : i + len(devices)]
-            runs = [
-                pool.submit(_run, engine, *cell, chosen[cell], device)
-                for cell, device in zip(now, devices, strict=False)
-            ]
-            for (controller, motion), run in zip(now, runs, strict=True):
+        # A controller keeps to its device, whose program it compiles; written in order, so that the
+        # file is reproducible.
+        controllers = list(dataset.controller.values)
+        pools = [ThreadPoolExecutor(1) for _ in devices]
+        place = {c: i % len(devices) for i, c in enumerate(controllers)}
+        runs = {
+            cell: pools[place[cell[0]]].submit(_run, engine, *cell, roles, devices[place[cell[0]]])
+            for cell, roles in chosen.items()
+        }
+        try:
+            for (controller, motion), run in runs.items():
                 write_dataset(run.result(), temporary, group=group(motion, controller))
+        finally:
+            for pool in pools:
+                pool.shutdown(cancel_futures=True)
 
 
 def group(motion: str, controller: str | None = None) -> str:
@@ -129,8 +133,8 @@ def _shared(engine: Engine, motion: str) -> xr.Dataset:
 def _run(engine: Engine, controller: str, motion: str, roles: dict, device) -> xr.Dataset:
     trials = np.array(list(roles))
     batches = [
-        engine.signals(controller, motion, trials[i : i + BATCH], device)
-        for i in range(0, trials.size, BATCH)
+        engine.signals(controller, motion, trials[i : i + FEW], device)
+        for i in range(0, trials.size, FEW)
     ]
     variables = {}
     for name in batches[0]:

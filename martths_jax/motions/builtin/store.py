@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import os
-import sys
 import tempfile
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
+
+from martths_jax.runtime import cache_folder
 
 from .facts import FACTS_FILE
 
@@ -17,28 +17,13 @@ from .facts import FACTS_FILE
 RECIPE = 1
 
 
-def cache_folder() -> Path:
-    """Folder for made motions: ``$MARTHS_CACHE``, else the platform's place for caches."""
-    if given := os.environ.get("MARTHS_CACHE"):
-        return Path(given).expanduser()
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "martths_jax"
-
-
 def cached(name: str, samples: int, make: Callable[[], np.ndarray]) -> np.ndarray:
     """(n,) result of `make`, kept under `name`; a folder that cannot be used is passed over."""
     recipe = hashlib.sha256(FACTS_FILE.read_bytes() + f"{name} {RECIPE}".encode()).hexdigest()
-    if os.environ.get("MARTHS_CACHE", "on").lower() in ("", "0", "off", "no"):
+    folder = cache_folder()
+    if folder is None:
         return make()
-    try:
-        path = cache_folder() / f"{name}-{recipe[:16]}.npy"
-    except RuntimeError:  # no home folder
-        return make()
+    path = folder / f"{name}-{recipe[:16]}.npy"
     try:
         values = np.load(path, allow_pickle=False)
         if values.shape == (samples,) and values.dtype == float and np.all(np.isfinite(values)):
