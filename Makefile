@@ -17,7 +17,7 @@ $(STAMP): pyproject.toml
 
 test: $(STAMP)  ## Check the style and run all tests.
 	$(BIN)/ruff check .
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 study: $(STAMP)  ## The study: 1000 uncertain plants, three motions, two controllers.
 	$(BIN)/martths study $(if $(RECORDS),--records $(RECORDS)) --out runs/study

@@ -1,4 +1,9 @@
-"""What all tests share: where the real records are, if they are, and strict numerics."""
+"""What all tests share: quick compilation, and where the real records are, if they are.
+
+Tests run short motions, so most of their time would be the compiler's: it is told not to optimise,
+except where the fixture ``optimised`` is used.  `MARTHS_TEST_OPTIMISED=1` runs all of them as users
+run the package.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +12,12 @@ from pathlib import Path
 
 import pytest
 
-import martths_jax  # first: it switches float64 on before any test touches JAX
+if not os.environ.get("MARTHS_TEST_OPTIMISED"):
+    quick = "--xla_backend_optimization_level=0"
+    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {quick}".strip()
+
+import martths_jax  # before any test touches JAX: it switches float64 on
+from martths_jax import runtime, simulation
 
 SIBLING = Path(__file__).resolve().parents[2] / "shared" / "benchmark"
 
@@ -27,3 +37,13 @@ def records() -> Path:
 def benchmark():
     """The benchmark with its defaults."""
     return martths_jax.build_benchmark()
+
+
+@pytest.fixture
+def optimised(monkeypatch):
+    """Compile simulations as users do: for long motions, and for what depends on the compiler."""
+    best = runtime.compiler_options() | {"xla_backend_optimization_level": 3}
+    monkeypatch.setattr(simulation, "compiler_options", lambda: best)
+    simulation.compiled.cache_clear()
+    yield
+    simulation.compiled.cache_clear()

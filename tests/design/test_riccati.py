@@ -31,7 +31,13 @@ def test_agrees_with_scipy(name, count, n, i):
     found = np.asarray(jax.jit(jax.vmap(ours))(*given))
     expected = np.stack([scipys(*one) for one in zip(*given, strict=True)])
     error = np.abs(found - expected).max((1, 2)) / np.abs(expected).max((1, 2))
-    assert error.max() < 1e-8
+    for k in np.flatnonzero(error > 1e-9):
+        # A system that an input hardly reaches: SciPy's own answer moves when its data are rounded.
+        signs = np.random.default_rng(k).choice([-1, 1], size=(20, *given[0][k].shape))
+        rounded = [scipys(given[0][k] * (1 + 2e-16 * s), *(x[k] for x in given[1:])) for s in signs]
+        own = np.abs(np.array(rounded) - expected[k]).max() / np.abs(expected[k]).max()
+        assert error[k] < max(1e-8, 10 * own)
+    assert np.count_nonzero(error > 1e-9) <= 0.01 * count
 
 
 @pytest.mark.parametrize("name", SOLVERS)

@@ -87,6 +87,7 @@ def test_signals_meet_the_oracle(name, benchmark, records):
         assert np.all(error < tolerance)
 
 
+@pytest.mark.usefixtures("optimised")
 @pytest.mark.parametrize("name", ["passthrough"])
 def test_indices_of_the_whole_record_meet_the_oracle(name, benchmark, records):
     expected = json.loads(
@@ -98,6 +99,7 @@ def test_indices_of_the_whole_record_meet_the_oracle(name, benchmark, records):
         assert found[key.replace(",", "_")][0] == pytest.approx(value, rel=1e-5)
 
 
+@pytest.mark.usefixtures("optimised")
 def test_default_adfc_meets_table_4(benchmark, records):
     """Means over the three real records, nominal plant."""
     from martths_jax.nominal import compare_with_table4
@@ -149,6 +151,7 @@ def test_a_delay_far_outside_the_first_range_is_found(benchmark):
     assert found["J1_1"][0] > 20
 
 
+@pytest.mark.usefixtures("optimised")
 def test_consistent_hybrid_loop_meets_the_reference_at_first_order():
     """Same frame out and in, ideal actuators, no noise: the error is that of one sample's delay."""
     errors = []
@@ -176,6 +179,7 @@ def test_published_partition_does_not_meet_the_reference():
     assert indices(result)["J7_4"][0] > 3
 
 
+@pytest.mark.usefixtures("optimised")
 def test_trial_alone_has_the_bits_it_has_in_a_batch(benchmark):
     motion, plants = burst(), draw_plants(5, 4)
     for controller in (LQG.design(benchmark), ADFC(nb=128, no=127)):

@@ -24,6 +24,7 @@ def judge():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("optimised")
 @pytest.mark.parametrize("name", BUILTIN_NAMES)
 def test_indices_are_within_a_tenth_of_the_records(name, judge, tmp_path_factory, monkeypatch):
     monkeypatch.setenv("MARTHS_CACHE", str(tmp_path_factory.getbasetemp() / "cache"))
