@@ -1,7 +1,9 @@
 """Sweeps end to end: a cell is what `simulate` gives, and no interruption changes a bit."""
 
 import csv
+import json
 
+import jax
 import numpy as np
 import pytest
 import xarray as xr
@@ -153,6 +155,15 @@ def test_interrupted_and_repeated_gives_the_same_files(whole, tmp_path):
     third = Stop()
     grid(tmp_path, reporter=third, figures=False)
     assert (third.before, third.ran) == (total, 0)
+
+
+def test_devices_change_no_bit(whole, tmp_path):
+    if len(jax.local_devices()) < 2:
+        pytest.skip("needs two devices")
+    grid(tmp_path, devices=2, figures=False)
+    about = json.loads((tmp_path / "provenance.json").read_text())["sessions"][0]
+    assert len(about["devices"]) == 2
+    assert files(tmp_path) == files(whole.folder)
 
 
 def test_another_configuration_is_refused_by_key(whole):
