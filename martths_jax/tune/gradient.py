@@ -17,11 +17,16 @@ from martths_jax.benchmark import Benchmark
 from martths_jax.errors import argument_error
 from martths_jax.motions import Motion
 from martths_jax.plant import Plants
+from martths_jax.runtime import compiler_options
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import draw_noise, lag_range, reference_response
 from martths_jax.tune.objective import Objective
 from martths_jax.tune.parameters import build
 from martths_jax.watch import Status
+
+#: Controllers whose gradient is taken in forward mode.  ADFC has two numbers and a long sample
+#: period, which becomes one kernel in forward mode but not in reverse (docs/tuning.md has figures).
+FORWARD = ("adfc",)
 
 
 def segment_length(samples: int, window: int) -> int:
@@ -56,6 +61,8 @@ class Gradient:
         devices = jax.local_devices()[: math.gcd(trials, jax.local_device_count())]
         lags = lag_range(0, fs) if objective.needs_delays else (1, 1)
 
+        forward = controller in FORWARD
+
         def value(logs, weights, plants, ground, reference, noise):
             ready = build(controller, benchmark, logs)
             sums, watch, _, peaks = loop.run(
@@ -67,16 +74,20 @@ class Gradient:
                 noise,
                 trials=plants.draws.shape[0],
                 lags=lags,
-                segment=segment_length(ground.shape[0], ready.window or loop.WINDOW),
+                segment=0
+                if forward
+                else segment_length(ground.shape[0], ready.window or loop.WINDOW),
                 tally=objective.tally,
             )
             loss, smooth = objective.evaluate(sums, watch, peaks, weights)
             lost = watching.status_of(watch) >= Status.DIVERGED
-            return jnp.mean(loss), (jax.tree.map(jnp.mean, smooth), jnp.mean(lost.astype(float)))
+            means = jax.tree.map(jnp.mean, smooth), jnp.mean(lost.astype(float))
+            return jnp.mean(loss), (jnp.mean(loss), means)
 
         def local(*arguments):
-            outcome = jax.value_and_grad(value, has_aux=True)(*arguments)
-            return jax.tree.map(lambda x: x[None], outcome)
+            slope_of = jax.jacfwd if forward else jax.grad
+            slope, (loss, means) = slope_of(value, has_aux=True)(*arguments)
+            return jax.tree.map(lambda x: x[None], ((loss, means), slope))
 
         sharded = jax.shard_map(
             local,
@@ -92,7 +103,7 @@ class Gradient:
             out_specs=P("trials"),
             check_vma=False,
         )
-        self.program = jax.jit(sharded)
+        self.program = jax.jit(sharded, compiler_options=compiler_options() if forward else None)
         noise = noise or SensorNoise()
         self.inputs = []
         for motion in motions:
@@ -109,7 +120,7 @@ class Gradient:
         """
         if objective.shape != self.objective.shape:
             raise argument_error(
-                "gradient", f"be of an objective of {objective.names}", self.objective.names
+                "gradient", f"be of the indices {objective.names}", self.objective.names
             )
         other = copy(self)
         other.objective = objective

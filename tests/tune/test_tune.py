@@ -11,8 +11,11 @@ from martths_jax import ADFC, LQG, InputError, build_benchmark, draw_plants, loa
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import reference_response
 from martths_jax.tune import Options, tune
+from martths_jax.tune import gradient as gradients
 from martths_jax.tune import search as searching
+from martths_jax.tune.gradient import Gradient
 from martths_jax.tune.objective import Objective
+from martths_jax.tune.parameters import start_of
 from tests.tune.bowl import Bowl
 
 
@@ -104,3 +107,24 @@ def test_unstable_start_is_refused(bowl, tmp_path, monkeypatch):
 def test_only_free_numbers_move(bowl, tmp_path):
     state = tune(None, replace(bowl, free=("q",)), [], tmp_path)
     assert state["best"]["pull"] == -5 and state["best"]["q"] < -3.5
+
+
+def test_gradient_of_plants_and_motions_and_of_other_weights(benchmark, motion, monkeypatch):
+    """Forward mode against finite differences; one program for all weights of the same indices."""
+    monkeypatch.setattr(gradients, "FORWARD", ("lqg",))
+    short = replace(motion, acceleration=motion.acceleration[512:1100])
+    gradient = Gradient(
+        benchmark, "lqg", Objective.parse("j5+j8"), draw_plants(2, seed=3), [short, short]
+    )
+    start = start_of("lqg")
+    other = gradient.of(Objective.parse("3*j5+0.5*j8"))
+    loss, slope, smooth, lost = other(start)
+    groups = {g: np.mean([v for n, v in smooth.items() if n[:2] == g]) for g in ("J5", "J8")}
+    assert lost == 0
+    assert loss == pytest.approx(3 * groups["J5"] + 0.5 * groups["J8"], rel=1e-12)
+    assert gradient(start)[0] == pytest.approx(groups["J5"] + groups["J8"], rel=1e-12)
+    for name in ("e1", "q"):
+        ends = [other(start | {name: start[name] + step})[0] for step in (1e-4, -1e-4)]
+        assert slope[name] == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-4)
+    with pytest.raises(InputError, match="J2_1"):
+        other.of(Objective.parse("j2"))
