@@ -29,14 +29,15 @@ HERE = Path(__file__).parent
 #: Program, what it is, whether it is far too slow for the whole job.
 PROGRAMS = {
     "engine": ("this engine", False),
-    "numba_blocked": ("Numba, trials in blocks of 8 lanes, body generated", False),
+    "numba_blocked": ("Numba, blocks of 8 lanes, loop body generated", False),
     "c_by_hand": ("C, vectorised by hand (gcc -ffast-math)", False),
+    "numba_lanes": ("Numba, trials blocked by hand, a loop over lanes in every line", False),
     "numba_scalar": ("Numba, one scalar loop a trial", False),
     "numpy_trials": ("NumPy, vectorised over trials", True),
     "jax_plain": ("JAX, plain vmap and jnp.linalg.solve", True),
 }
 #: Programs that compile in their first run.
-COMPILED = ("engine", "numba_blocked", "numba_scalar", "jax_plain")
+COMPILED = ("engine", "numba_blocked", "numba_lanes", "numba_scalar", "jax_plain")
 SLOW_SAMPLES = 3072
 #: Rows of J1 and J4 among the 24: whole samples, so they agree or differ by one.
 DELAYS = [0, 1, 6, 7]

@@ -1,4 +1,3 @@
-# ruff: noqa: E402  (the vector width is set before Numba starts)
 """Numba written for speed: trials side by side in blocks, blocks in parallel.
 
 One sample of a block is one loop over its lanes whose body is straight-line scalar code, so that
@@ -11,19 +10,11 @@ below, matrices of the benchmark as literals.
 from __future__ import annotations
 
 import math
-import os
 
-from llvmlite import binding
-
-# Full AVX-512 vectors where the processor has them; LLVM keeps to half of that by default.
-_features = binding.get_host_cpu_features()
-if _features.get("avx512f"):
-    os.environ.setdefault("NUMBA_CPU_NAME", binding.get_host_cpu_name())
-    os.environ.setdefault("NUMBA_CPU_FEATURES", _features.flatten() + ",-prefer-256-bit")
-
-import numba
 import numpy as np
 from job import LAG, LAGS, LEAD, NEVER, RUNAWAY_MM, VOLT_LIMIT, Job, Sums
+
+from peers.wide_numba import numba
 
 LANES = 8
 TILE = 8  # samples whose correlations are added at a time

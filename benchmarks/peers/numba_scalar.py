@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from job import LAGS, LEAD, NEVER, RUNAWAY_MM, VOLT_LIMIT, Job, Sums
+
+from peers.wide_numba import numba
 
 FASTMATH = {"contract", "nsz", "arcp"}
 
