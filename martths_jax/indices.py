@@ -103,6 +103,11 @@ def correlate(y: jax.Array, x: jax.Array, lags: tuple[int, int]) -> jax.Array:
     return total[::-1]
 
 
+def library(*arrays):
+    """NumPy for arrays on the host, which then needs no compiling; ``jax.numpy`` for others."""
+    return jnp if any(isinstance(x, jax.Array) for x in arrays) else np
+
+
 def delay_ms(sums: IndexSums, interpolate: bool) -> jax.Array:
     """(4, T) lags of the largest cross-correlations, positive = late [ms].
 
@@ -110,29 +115,32 @@ def delay_ms(sums: IndexSums, interpolate: bool) -> jax.Array:
         interpolate: refine the whole-sample lag by the parabola through its neighbours.
     """
     r = sums.correlation
-    best = jnp.argmax(r, axis=0)
+    xp = library(r)
+    best = xp.argmax(r, axis=0)
     lag = (best - sums.lags[0]).astype(float)
     if interpolate:
-        inside = jnp.clip(best, 1, r.shape[0] - 2)
+        inside = xp.clip(best, 1, r.shape[0] - 2)
         left, middle, right = (
-            jnp.take_along_axis(r, (inside + d)[None], axis=0)[0] for d in (-1, 0, 1)
+            xp.take_along_axis(r, (inside + d)[None], axis=0)[0] for d in (-1, 0, 1)
         )
         bend = left - 2 * middle + right
-        offset = jnp.where(bend < 0, (left - right) / (2 * jnp.where(bend < 0, bend, 1.0)), 0.0)
-        lag = lag + jnp.where(inside == best, jnp.clip(offset, -0.5, 0.5), 0.0)
+        offset = xp.where(bend < 0, (left - right) / (2 * xp.where(bend < 0, bend, 1.0)), 0.0)
+        lag = lag + xp.where(inside == best, xp.clip(offset, -0.5, 0.5), 0.0)
     return lag / sums.fs * 1e3
 
 
 def peak_at_edge(sums: IndexSums) -> jax.Array:
     """(T,) whether a correlation peaks at the end of its range, so that the delay is a bound."""
-    best = jnp.argmax(sums.correlation, axis=0)
-    return jnp.any((best == 0) | (best == sums.correlation.shape[0] - 1), axis=0)
+    xp = library(sums.correlation)
+    best = xp.argmax(sums.correlation, axis=0)
+    return xp.any((best == 0) | (best == sums.correlation.shape[0] - 1), axis=0)
 
 
 def indices_of(sums: IndexSums, interpolate: bool = False) -> dict[str, jax.Array]:
     """The 24 indices (T,) from the sums of a run; differentiable except for the delays."""
-    rms = 100 * jnp.sqrt(sums.error_square / sums.target_square)
-    peak = 100 * sums.error_peak / sums.target_peak
+    with np.errstate(all="ignore"):  # a trial that diverged, or a target that never moves
+        rms = 100 * library(sums.error_square).sqrt(sums.error_square / sums.target_square)
+        peak = 100 * sums.error_peak / sums.target_peak
     found = dict(zip(DELAYS, delay_ms(sums, interpolate), strict=True))
     for (rms_name, peak_name), r, p in zip(PAIRS, rms, peak, strict=True):
         found[rms_name], found[peak_name] = r, p

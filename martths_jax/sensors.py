@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -58,6 +59,7 @@ class SensorNoise:
         return unit * jnp.sqrt(self.variance(fs))
 
 
+@partial(jax.jit, static_argnames=("samples", "channels"))
 def unit_noise(seed: int, trial: jax.Array, samples: int, channels: int) -> jax.Array:
     """(N, channels, T) standard normal sequences of the given trials."""
     stream = jax.random.fold_in(jax.random.key(seed), NOISE_STREAM)

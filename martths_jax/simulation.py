@@ -27,9 +27,9 @@ from martths_jax.watch import Status
 
 #: Trials a device runs side by side: enough for wide vectors, few enough to stay in its cache.
 LANES = 64
-#: Motions are padded to a multiple of this, so that records of all usual lengths share a program;
-#: the loop stops where the motion ends [samples].
-ROOM = 2**16
+#: Motions are padded to a power of two between these, longer ones to a multiple of the second, so
+#: that records of all usual lengths share a program; the loop stops at a motion's end [samples].
+ROOMS = (2**12, 2**16)
 #: Trials a device that keep their signals, where no more are asked for than these; otherwise all.
 FEW = 8
 #: Ranges of the cross-correlations [samples at 1024 Hz], tried in turn until the peak is inside.
@@ -255,7 +255,7 @@ def run_block(
     own_noise = noise.shape[-1] > 1
     samples = setup.ground.shape[0]
     # Signals of many trials take memory for all the room there is, so they get no more than needed.
-    room = samples if kept > FEW else -(-max(samples, noise.shape[0]) // ROOM) * ROOM
+    room = samples if kept > FEW else room_for(max(samples, noise.shape[0]))
     ground, reference, noise = (fit(x, room) for x in (setup.ground, setup.reference, noise))
     for attempt in range(controller.first_lag_range, len(LAG_RANGES)):
         lags = lag_range(attempt, setup.benchmark.fs)
@@ -266,10 +266,18 @@ def run_block(
         back = lambda x: np.moveaxis(np.asarray(x)[: which.size], 0, -1)  # noqa: E731
         sums, watch = jax.tree.map(back, (sums, watch))
         lost = np.asarray(watching.status_of(watch)) >= Status.DIVERGED
-        if not (retry and np.any(np.asarray(peak_at_edge(sums)) & ~lost)):
+        if not (retry and np.any(peak_at_edge(sums) & ~lost)):
             break
     signals = {name: _trial_first(x, samples)[: which.size] for name, x in signals.items()}
     return sums, watch, signals
+
+
+def room_for(samples: int) -> int:
+    """Length that a motion is padded to [samples], see ``ROOMS``."""
+    least, most = ROOMS
+    if samples > most:
+        return -(-samples // most) * most
+    return max(least, 1 << (samples - 1).bit_length())
 
 
 def _trial_first(signal: jax.Array, samples: int) -> np.ndarray:

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from martths_jax.benchmark import VOLT_LIMIT, command_volts
+from martths_jax.indices import library
 
 #: A command or stroke beyond this is a loop that has run away: the largest stroke in the study is
 #: about a tenth of it, and the coupler has no position for strokes 254 mm apart.
@@ -89,14 +90,15 @@ def update(watch: Watch, k: jax.Array, valid: jax.Array, signals: dict[str, jax.
 
 def status_of(watch: Watch) -> jax.Array:
     """(T,) ``Status`` of each trial."""
-    happened = lambda first: jnp.any(jnp.asarray(first) != NEVER, axis=0)  # noqa: E731
+    xp = library(*vars(watch).values())
+    happened = lambda first: xp.any(first != NEVER, axis=0)  # noqa: E731
     runaway = happened(watch.command) | happened(watch.stroke)
     # A trial that ran away overflows in the end; only one that is lost at once is "nonfinite".
-    first_bad = jnp.minimum(jnp.min(watch.command, axis=0), jnp.min(watch.stroke, axis=0))
-    at_once = happened(watch.nonfinite) & (jnp.min(watch.nonfinite, axis=0) <= first_bad)
-    status = jnp.where(happened(watch.saturated), Status.SATURATED, Status.OK)
-    status = jnp.where(runaway, Status.DIVERGED, status)
-    return jnp.where(at_once, Status.NONFINITE, status)
+    first_bad = xp.minimum(xp.min(watch.command, axis=0), xp.min(watch.stroke, axis=0))
+    at_once = happened(watch.nonfinite) & (xp.min(watch.nonfinite, axis=0) <= first_bad)
+    status = xp.where(happened(watch.saturated), Status.SATURATED, Status.OK)
+    status = xp.where(runaway, Status.DIVERGED, status)
+    return xp.where(at_once, Status.NONFINITE, status)
 
 
 def describe(watch: Watch, trial: int, fs: float) -> str:

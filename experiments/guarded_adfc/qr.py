@@ -2,8 +2,8 @@
 
     MARTHS_RECORDS=... python experiments/guarded_adfc/qr.py
 
-takes the strokes and commands of literal trials that are lost, and solves each buffer up to the loss
-again by Householder QR (columns scaled).
+takes the strokes and commands of literal trials that are lost, and solves each buffer up to the
+loss again by Householder QR (columns scaled).
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ def main():
     motion = load_motion("elcentro", scale=0.4, fs=bench.fs, records=RECORDS)
     plants = draw_plants(PLANTS, seed=1)
     outcome = run(bench, Guard(), plants, motion, seed=1, keep=PLANTS // 8)
-    apart, before = [], []
+    apart = []
     for trial in np.flatnonzero(outcome.lost):
-        x_hat, u, C = (outcome.signals[trial][:, s] for s in (slice(4, 6), slice(6, 8), slice(8, 24)))
+        x_hat, u, C = np.split(outcome.signals[trial][:, 4:], [2, 4], axis=1)
         phi, applied = regressors(x_hat), np.roll(u, 1, axis=0)
         last = int(outcome.first_bad[trial])
         for k in range(NB + TAPS - 1, last, STEP):
@@ -42,12 +42,11 @@ def main():
             by_qr = linalg.solve_triangular(r, q.T @ applied[rows]) / size[:, None]
             used = C[k].reshape(8, 2)
             apart.append(np.abs(by_qr - used).max() / np.abs(by_qr).max())
-            before.append(last - k)
     apart = np.array(apart)
     print(
         f"{outcome.lost.sum()} of {PLANTS} trials lost; {apart.size} buffers before a loss: "
-        f"coefficients by QR and by normal equations differ by {np.median(apart):.1e} in the median "
-        f"and {apart.max():.1e} at most (relative to the largest coefficient)"
+        f"coefficients by QR and by normal equations differ by {np.median(apart):.1e} in the "
+        f"median and {apart.max():.1e} at most (relative to the largest coefficient)"
     )
 
 

@@ -6,6 +6,7 @@ import sys
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from martths_jax import __version__
 from martths_jax.cli import figures, motions, nominal, sensitivity, study, sweep, tune
@@ -56,7 +57,8 @@ def main() -> None:
     try:
         app()
     except InputError as error:
-        error_console.print(f"[bold red]Error:[/] {error}", highlight=False, soft_wrap=True)
+        text = f"[bold red]Error:[/] {escape(str(error))}"
+        error_console.print(text, highlight=False, soft_wrap=True)
         sys.exit(2)
     except KeyboardInterrupt:
         error_console.print("Interrupted; no half-written file was left.")

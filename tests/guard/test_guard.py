@@ -16,7 +16,9 @@ from martths_jax import (
     indices,
     nominal_plant,
     simulate,
+    simulation,
 )
+from martths_jax.controllers import adfc
 from martths_jax.controllers import least_squares as ls
 from martths_jax.controllers.adfc import BACKWARD_DIFFERENCES, CONDITION_LIMIT
 from martths_jax.controllers.inverse import nominal_inverse
@@ -84,6 +86,21 @@ def test_a_singular_fit_keeps_the_last_good_coefficients(benchmark):
     assert result.watch.held.tolist() == [0]
     anchor = nominal_inverse(benchmark.plant_model, benchmark.fs, BACKWARD_DIFFERENCES)
     np.testing.assert_allclose(result.signals["C_A"][0, -1], anchor, rtol=1e-12)
+
+
+def test_a_fit_beyond_the_condition_limit_is_held(benchmark, monkeypatch):
+    """With a limit that no fit meets all are held, though each has a solution."""
+    shaken = Motion("shaken", np.sin(np.arange(400.0) / 20), 1024.0)
+    controller = ADFC(nb=80, no=79, pull=1e-6)
+    free = simulate(benchmark, controller, nominal_plant(), shaken, keep=True)
+    assert free.watch.held.tolist() == [0]
+    monkeypatch.setattr(adfc, "CONDITION_LIMIT", 1.0)
+    simulation.compiled.cache_clear()
+    held = simulate(benchmark, controller, nominal_plant(), shaken, keep=True)
+    simulation.compiled.cache_clear()
+    assert held.watch.held.tolist() == [len(range(80 + 4, 400))]
+    assert np.all(held.signals["C_A"] == adfc.FOLLOW_TARGET)
+    assert not np.allclose(free.signals["C_A"][0, -1], adfc.FOLLOW_TARGET)
 
 
 @pytest.mark.parametrize("solver", sorted(ls.SOLVERS))
