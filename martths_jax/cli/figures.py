@@ -77,11 +77,19 @@ def report(
     ] = None,
     trial: Trial = 0,
     only: Only = None,
+    beside: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--beside", help="Folder of a sweep, sensitivity study or tuning to show; repeatable."
+        ),
+    ] = None,
 ) -> None:
     """Write one HTML file to look through a study: tables, figures, all trials, histories."""
     from martths_jax.report import write_report
 
-    path = write_report(folder, out, trial=trial, only=only or (), progress=_tell)
+    path = write_report(
+        folder, out, trial=trial, only=only or (), beside=beside or (), progress=_tell
+    )
     _say(f"Wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
 
 

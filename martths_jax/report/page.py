@@ -14,6 +14,7 @@ import numpy as np
 
 from martths_jax.figures import drawings, open_source
 from martths_jax.files import atomic
+from martths_jax.report.beside import beside_html
 from martths_jax.report.payload import history_payload, trial_payload
 from martths_jax.report.tables import study_tables
 from martths_jax.study import Study
@@ -30,6 +31,7 @@ def write_report(
     *,
     trial: int = 0,
     only: Sequence[str] = (),
+    beside: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda name: None,
 ) -> Path:
     """Write the report of a study.
@@ -39,28 +41,31 @@ def write_report(
         out: file to write; ``report.html`` in the folder if None.
         trial: whose histories the figures draw.
         only: beginnings of the names of the figures wanted; all if empty.
+        beside: folders of sweeps, sensitivity studies and tunings to show as well.
         progress: told the name of every figure drawn.
 
     Returns:
         path of the file.
 
     Raises:
-        InputError: no such study, trial or figure, or the file cannot be written.
+        InputError: no such study, trial or figure, a folder of another kind, or the file cannot be
+            written.
     """
     source = open_source(folder, trial)
+    others = beside_html(beside, _html_table)
     out = Path(folder) / "report.html" if out is None else Path(out)
     pictures = []
     for name, drawing in drawings(source, only):
         pictures.append(_picture(name, drawing))
         progress(name)
-    text = compose(source.study, "\n".join(pictures))
+    text = compose(source.study, "\n".join(pictures), others)
     with atomic(out) as part:
         part.write_text(text, encoding="utf-8")
     return out
 
 
-def compose(study: Study, pictures: str) -> str:
-    """The page's text from a study and its figures as HTML."""
+def compose(study: Study, pictures: str, others: str = "") -> str:
+    """The page's text from a study, its figures as HTML, and what else is shown."""
     from plotly.offline import get_plotlyjs
 
     summary = summarise(study.dataset)
@@ -73,6 +78,8 @@ def compose(study: Study, pictures: str) -> str:
         "ENDS": _html_table(summary.tables[0], fold=False),
         "TABLES": "\n".join(_html_table(t, fold=i > 0) for i, t in enumerate(tables)),
         "FIGURES": pictures,
+        "BESIDE": others,
+        "LINK": '<a href="#beside">Sweeps and tunings</a>' if others else "",
         "PROVENANCE": _provenance(study),
         "PLOTLY": get_plotlyjs(),
         # A closing tag inside the data would end the script element.

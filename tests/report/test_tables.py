@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 
+import matplotlib.image
 import numpy as np
 import pytest
 
@@ -88,3 +89,25 @@ def test_replay_gives_the_study_s_bits_and_keeps_the_signals(tmp_path):
     motion_file.unlink()
     with pytest.raises(InputError, match="cannot be run again here"):
         replay(folder, 3)
+
+
+def test_a_tuning_beside_the_study(study_folder, tmp_path):
+    tuned = tmp_path / "tuned"
+    tuned.mkdir()
+    (tuned / "design.json").write_text(
+        '{"controller": "lqg", "ended": "done", "e1": 3.5}'
+    )
+    (tuned / "comparison.csv").write_text("index,start,tuned\nJ2_1,5.25,4.125\n")
+    matplotlib.image.imsave(tuned / "convergence.png", np.zeros((4, 4)))
+    (tuned / "large.png").write_bytes(bytes(5_000_000))
+    path = write_report(study_folder, tmp_path / "r.html", only=["frame"], beside=[tuned])
+    page = path.read_text("utf-8")
+    assert '<a href="#beside">' in page and "Tuning of lqg" in page
+    assert "<td>J2_1</td><td>5.250</td><td>4.125</td>" in page
+    assert 'alt="convergence"' in page
+    assert 'alt="large"' not in page and "large.png" in page
+
+
+def test_a_folder_of_another_kind_beside_the_study(study_folder, tmp_path):
+    with pytest.raises(InputError, match="holds no finished sweep"):
+        write_report(study_folder, tmp_path / "r.html", only=["frame"], beside=[tmp_path])

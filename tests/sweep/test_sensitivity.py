@@ -10,6 +10,7 @@ from martths_jax import InputError, Passthrough, SensorNoise, build_benchmark, i
 from martths_jax.cli import app
 from martths_jax.indices import NAMES
 from martths_jax.plant import PARAMETERS
+from martths_jax.report.beside import open_beside
 from martths_jax.sensitivity import open_sensitivity, run_sensitivity, sobol
 from martths_jax.sensitivity.design import make_design
 from tests.study.places import short_motion
@@ -115,3 +116,9 @@ def test_command_line(tmp_path):
     found = open_sensitivity(tmp_path / "out")
     assert "motion" not in found.dataset.factor.values
     assert "too small" in (tmp_path / "out" / "summary.md").read_text()
+
+
+def test_a_report_shows_it(whole):
+    found, pictures = open_beside(whole.folder)
+    assert found.heading == whole.summary().heading
+    assert pictures

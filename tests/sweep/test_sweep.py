@@ -24,6 +24,7 @@ from martths_jax import (
 from martths_jax.cli import app
 from martths_jax.indices import NAMES
 from martths_jax.motions import Motion
+from martths_jax.report.beside import open_beside
 from martths_jax.study import Reporter
 from martths_jax.study.statistics import percentile
 from martths_jax.sweep import open_sweep, run_sweep
@@ -257,3 +258,9 @@ def test_command_line(tmp_path):
     again = CliRunner().invoke(app, ["sweep", "--no", "1", "--hop", "3", "--axis", "gain=2"])
     assert isinstance(again.exception, InputError)
     assert "gain" in str(again.exception) and "all set the overlap" in str(again.exception)
+
+
+def test_a_report_shows_it(whole):
+    found, pictures = open_beside(whole.folder)
+    assert found.tables[0].rows == whole.summary().tables[0].rows
+    assert pictures and all(p.suffix == ".png" for p in pictures)
