@@ -8,10 +8,22 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from martths_jax.cli.console import console, error_console
+from martths_jax.cli.console import console
 from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
-from martths_jax.cli.study import Quiet, _reporter, _set_devices
-from martths_jax.cli.sweep import _words
+from martths_jax.cli.run_options import (
+    Config,
+    Controllers,
+    Devices,
+    Figures,
+    Memory,
+    MotionList,
+    Quiet,
+    given_settings,
+    reporter_for,
+    say_what_is_kept,
+    set_devices,
+    words,
+)
 from martths_jax.sensitivity import run_sensitivity
 from martths_jax.sensitivity.results import leading
 from martths_jax.study.config import read_toml
@@ -26,24 +38,13 @@ def sensitivity(
             "--trials", help="Base samples N, a power of two; N (d + 2) runs; 256 if left out."
         ),
     ] = None,
-    config: Annotated[
-        Path | None, typer.Option("--config", help="TOML file of a study; flags override it.")
-    ] = None,
+    config: Config = None,
     seed: Annotated[
         int | None, typer.Option("--seed", help="Seed of the design; 1 if left out.")
     ] = None,
-    controllers: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--controllers",
-            "--controller",
-            help="Controllers, separated by commas or repeated; adfc if left out.",
-        ),
-    ] = None,
+    controllers: Controllers = None,
     motions: Motions = None,
-    motion_list: Annotated[
-        str | None, typer.Option("--motions", help="Motions separated by commas.")
-    ] = None,
+    motion_list: MotionList = None,
     records: Records = None,
     scale: Scale = None,
     pga: Pga = None,
@@ -62,38 +63,30 @@ def sensitivity(
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Start over: delete the analysis in the folder.")
     ] = False,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
-    devices: Annotated[
-        int | None, typer.Option("--devices", help="Devices to use; all, one a core, if left out.")
-    ] = None,
-    memory_gb: Annotated[
-        float | None, typer.Option("--memory", help="Bound on the memory of the noise [GB].")
-    ] = None,
+    figures: Figures = True,
+    devices: Devices = None,
+    memory_gb: Memory = None,
     quiet: Quiet = False,
 ) -> None:
     """What drives each index: Sobol' indices of plant parameters, noise and motion."""
-    asked = (motions or []) + (_words([motion_list]) if motion_list else [])
-    given = {
-        "trials": trials, "seed": seed, "controllers": _words(controllers), "motions":
-        asked or None, "records": records, "scale": scale, "pga": pga, "sa": sa, "units": units,
-        "resample": resample, "out": out, "devices": devices, "memory_gb": memory_gb,
-    }  # fmt: skip
+    given = given_settings(
+        motions, motion_list, trials=trials, seed=seed, controllers=controllers, records=records,
+        scale=scale, pga=pga, sa=sa, units=units, resample=resample, out=out, devices=devices,
+        memory_gb=memory_gb,
+    )  # fmt: skip
     if devices is not None and devices > 0:
-        _set_devices(devices)
+        set_devices(devices)
     try:
         done = run_sensitivity(
-            ({} if config is None else read_toml(config))
-            | {k: v for k, v in given.items() if v is not None},
-            shown=_words(index) or SHOWN,
-            reporter=_reporter(quiet),
+            ({} if config is None else read_toml(config)) | given,
+            shown=words(index) or SHOWN,
+            reporter=reporter_for(quiet),
             fresh=fresh,
             figures=figures,
             command_line=command_line(),
         )
     except KeyboardInterrupt:
-        error_console.print(
-            "What is finished is kept; repeat the command to go on.", highlight=False
-        )
+        say_what_is_kept(out or "sensitivity")
         raise
     if quiet:
         return

@@ -6,14 +6,20 @@ import re
 from pathlib import Path
 from typing import Annotated
 
-import jax
 import typer
 from rich.markup import escape
 
 from martths_jax.cli.console import console, error_console
 from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
+from martths_jax.cli.run_options import (
+    Devices,
+    Quiet,
+    reporter_for,
+    say_what_is_kept,
+    set_devices,
+)
 from martths_jax.errors import InputError, argument_error
-from martths_jax.study import Bars, Lines, Reporter, Study, merge_runs, open_study, run_study
+from martths_jax.study import Study, merge_runs, open_study, run_study
 from martths_jax.study.config import make_config, read_toml
 from martths_jax.study.distributed import join
 from martths_jax.study.export import export_plants, write_csv, write_mat
@@ -21,7 +27,6 @@ from martths_jax.study.provenance import command_line
 from martths_jax.study.template import write_template
 
 Folder = Annotated[Path, typer.Argument(help="Folder of a study.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")]
 Keep = Annotated[
     str | None,
     typer.Option("--keep", metavar="1,617", help="Trials whose signals are stored too."),
@@ -64,9 +69,7 @@ def study(
     signals: Annotated[
         bool | None, typer.Option("--signals/--no-signals", help="Store chosen trials' signals.")
     ] = None,
-    devices: Annotated[
-        int | None, typer.Option("--devices", help="Devices to use [all: one a core].")
-    ] = None,
+    devices: Devices = None,
     memory_gb: Annotated[
         float | None, typer.Option("--memory", help="Bound on a chunk's memory [GB].")
     ] = None,
@@ -102,7 +105,7 @@ def study(
     settings = {} if config is None else read_toml(config)
     chosen = make_config(settings | {k: v for k, v in given.items() if v is not None})
     if chosen.devices is not None:
-        _set_devices(chosen.devices)
+        set_devices(chosen.devices)
     share = _share(shard)
     together = distributed or any(x is not None for x in (coordinator, num_processes, process_id))
     if together:
@@ -114,17 +117,14 @@ def study(
     try:
         done = run_study(
             chosen,
-            reporter=_reporter(quiet),
+            reporter=reporter_for(quiet),
             fresh=fresh,
             share=share,
             together=together,
             command_line=command_line(),
         )
     except KeyboardInterrupt:
-        error_console.print(
-            f"What is finished is kept in {chosen.out}; repeat the command to go on.",
-            highlight=False, soft_wrap=True, markup=False,
-        )  # fmt: skip
+        say_what_is_kept(chosen.out)
         raise
     if done is not None:
         _show(done, quiet, chosen.max_failed)
@@ -161,7 +161,7 @@ def merge(
         records=None if records is None else str(records),
         signals=signals,
         keep=trial_list(keep) or (),
-        reporter=_reporter(quiet),
+        reporter=reporter_for(quiet),
     )
     _show(done, quiet)
 
@@ -210,19 +210,6 @@ def _share(text: str | None) -> tuple[int, int] | None:
     if not match or not 1 <= int(match[1]) <= int(match[2]):
         raise argument_error("shard", "be I/N with 1 <= I <= N, such as 3/16", repr(text))
     return int(match[1]), int(match[2])
-
-
-def _set_devices(count: int) -> None:
-    try:
-        jax.config.update("jax_num_cpu_devices", count)
-    except RuntimeError:  # JAX runs already (a program that calls this command)
-        pass
-
-
-def _reporter(quiet: bool) -> Reporter:
-    if quiet:
-        return Reporter()
-    return Bars(error_console) if error_console.is_terminal else Lines(error_console)
 
 
 def _show(done: Study, quiet: bool, max_failed: int | None = None) -> None:

@@ -8,9 +8,22 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from martths_jax.cli.console import console, error_console
+from martths_jax.cli.console import console
 from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
-from martths_jax.cli.study import Quiet, _reporter, _set_devices
+from martths_jax.cli.run_options import (
+    Config,
+    Controllers,
+    Devices,
+    Figures,
+    Memory,
+    MotionList,
+    Quiet,
+    given_settings,
+    reporter_for,
+    say_what_is_kept,
+    set_devices,
+    words,
+)
 from martths_jax.study.config import read_toml
 from martths_jax.study.provenance import command_line
 from martths_jax.sweep import make_sweep, run_sweep
@@ -19,13 +32,6 @@ from martths_jax.sweep.config import SHOWN
 
 #: A longer table than this is not printed; it is in the folder.
 MOST_ROWS = 60
-
-
-def _words(given: list[str] | None) -> list[str] | None:
-    """A repeated option whose values may also be separated by commas."""
-    if not given:
-        return None
-    return [word.strip() for text in given for word in text.split(",") if word.strip()]
 
 
 def _axis(name: str, what: str):
@@ -49,27 +55,16 @@ def sweep(
             "noise_power, fs, alpha, p, spread; may be repeated.",
         ),
     ] = None,
-    config: Annotated[
-        Path | None, typer.Option("--config", help="TOML file of a study; flags override it.")
-    ] = None,
+    config: Config = None,
     trials: Annotated[
         int | None, typer.Option("--trials", help="Uncertain plants; 200 if left out.")
     ] = None,
     seed: Annotated[
         int | None, typer.Option("--seed", help="Seed of all draws; 1 if left out.")
     ] = None,
-    controllers: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--controllers",
-            "--controller",
-            help="Controllers, separated by commas or repeated; adfc if left out.",
-        ),
-    ] = None,
+    controllers: Controllers = None,
     motions: Motions = None,
-    motion_list: Annotated[
-        str | None, typer.Option("--motions", help="Motions separated by commas.")
-    ] = None,
+    motion_list: MotionList = None,
     records: Records = None,
     scale: Scale = None,
     pga: Pga = None,
@@ -88,43 +83,35 @@ def sweep(
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Start over: delete the sweep in the folder.")
     ] = False,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")] = True,
-    devices: Annotated[
-        int | None, typer.Option("--devices", help="Devices to use; all, one a core, if left out.")
-    ] = None,
-    memory_gb: Annotated[
-        float | None, typer.Option("--memory", help="Bound on the memory of the noise [GB].")
-    ] = None,
+    figures: Figures = True,
+    devices: Devices = None,
+    memory_gb: Memory = None,
     quiet: Quiet = False,
 ) -> None:
     """Repeat a study on a grid of parameters, the same plants and noise in every cell."""
     flags = {"nb": nb, "no": no, "no_fraction": no_fraction, "hop": hop, "fb": fb}
     axes = [(k, v) for k, v in flags.items() if v is not None]
     axes += [split_axis(text) for text in axis or ()]
-    asked = (motions or []) + (_words([motion_list]) if motion_list else [])
-    given = {
-        "trials": trials, "seed": seed, "controllers": _words(controllers), "motions":
-        asked or None, "records": records, "scale": scale, "pga": pga, "sa": sa, "units": units,
-        "resample": resample, "out": out, "devices": devices, "memory_gb": memory_gb,
-    }  # fmt: skip
+    given = given_settings(
+        motions, motion_list, trials=trials, seed=seed, controllers=controllers, records=records,
+        scale=scale, pga=pga, sa=sa, units=units, resample=resample, out=out, devices=devices,
+        memory_gb=memory_gb,
+    )  # fmt: skip
     settings = {} if config is None else read_toml(config)
     chosen = make_sweep(
         axes,
-        settings | {k: v for k, v in given.items() if v is not None},
-        shown=_words(index) or SHOWN,
+        settings | given,
+        shown=words(index) or SHOWN,
     )
     if chosen.study.devices is not None:
-        _set_devices(chosen.study.devices)
+        set_devices(chosen.study.devices)
     try:
         done = run_sweep(
-            chosen, reporter=_reporter(quiet), fresh=fresh, figures=figures,
+            chosen, reporter=reporter_for(quiet), fresh=fresh, figures=figures,
             command_line=command_line(),
         )  # fmt: skip
     except KeyboardInterrupt:
-        error_console.print(
-            f"What is finished is kept in {chosen.study.out}; repeat the command to go on.",
-            highlight=False, soft_wrap=True, markup=False,
-        )  # fmt: skip
+        say_what_is_kept(chosen.study.out)
         raise
     if quiet:
         return
