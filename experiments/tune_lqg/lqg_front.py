@@ -7,7 +7,7 @@ For each w the six weights minimise w J5 + (1 - w) J8 on uncertain plants and th
 Centro, each w from where the one before ended.  The gradient is that of ``martths tune``, the
 descent L-BFGS: the weights lie in a narrow valley, which its curvature follows in fewer runs than
 Adam's steps.  Writes results/lqg_front.csv (log10 of the weights).  The XLA flag only saves
-time: the gradient compiles four times faster with it.
+time in compiling.
 """
 
 from __future__ import annotations
