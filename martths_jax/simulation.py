@@ -21,7 +21,7 @@ from martths_jax.indices import IndexSums, peak_at_edge
 from martths_jax.motions import Motion
 from martths_jax.plant import Plants
 from martths_jax.runtime import compiler_options
-from martths_jax.sensors import SensorNoise
+from martths_jax.sensors import SensorNoise, unit_noise
 from martths_jax.structure.modal import respond
 from martths_jax.watch import Status
 
@@ -206,9 +206,11 @@ def run_blocks(setup: Setup, plants, noise, keep: bool, progress=None):
     for first in range(0, trials, size):
         which = np.arange(first, min(first + size, trials))
         lanes = fill(which, size)
-        block_noise = draw_noise(
-            noise, np.asarray(plants.trial)[lanes], setup.ground.shape[0], setup.benchmark.fs, lanes
-        )
+        samples, fs = setup.ground.shape[0], setup.benchmark.fs
+        if isinstance(noise, SensorNoise):
+            block_noise = draw_on(devices, noise, np.asarray(plants.trial)[lanes], samples, fs)
+        else:
+            block_noise = draw_noise(noise, None, samples, fs, lanes)
         blocks.append(run_block(setup, plants, block_noise, which, devices, keep))
         if progress:
             progress(int(which[-1]) + 1, trials)
@@ -351,6 +353,38 @@ def draw_noise(noise, trial, samples: int, fs: float, lanes=None) -> jax.Array:
         return jnp.asarray(noise)[:samples, :, None]
     noise = noise if lanes is None else noise[lanes]
     return jnp.moveaxis(jnp.asarray(noise)[:, :samples], 0, -1)
+
+
+def draw_on(devices, noise: SensorNoise, trial: np.ndarray, samples: int, fs: float) -> jax.Array:
+    """(N, 1 or 2, T) noise of a filled block, drawn on the devices that run it [mm].
+
+    Args:
+        devices: each draws ``LANES`` trials, so that a trial's noise has the same bits on any.
+        noise: the model.
+        trial: (T,) trial numbers, ``LANES`` a device.
+        samples: length N.
+        fs: sampling rate [Hz].
+    """
+    program = noise_program(tuple(devices), samples, noise.channels)
+    return program(jnp.asarray(trial), noise.seed, noise.power * fs)
+
+
+@lru_cache(maxsize=16)
+def noise_program(devices: tuple, samples: int, channels: int):
+    """The program behind ``draw_on``."""
+    mesh = Mesh(np.array(devices), ("trials",))
+
+    def draw(trial, seed, variance):
+        local = lambda t: unit_noise(seed, t, samples, channels)  # noqa: E731
+        return jnp.sqrt(variance) * jax.shard_map(
+            local,
+            mesh=mesh,
+            in_specs=P("trials"),
+            out_specs=P(None, None, "trials"),
+            check_vma=False,
+        )(trial)
+
+    return jax.jit(draw, static_argnums=1)
 
 
 def lag_range(attempt: int, fs: float) -> tuple[int, int]:

@@ -14,16 +14,14 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.sharding import Mesh
-from jax.sharding import PartitionSpec as P
 
 from martths_jax.errors import InputError
 from martths_jax.indices import NAMES, indices
-from martths_jax.sensors import unit_noise
 from martths_jax.simulation import (
     LANES,
     Result,
     Setup,
+    draw_on,
     fill,
     prepare,
     reference_response,
@@ -141,16 +139,11 @@ class Engine:
     def _drawn(self, trial: np.ndarray, devices: list) -> list:
         size = LANES * len(devices)
         positions = np.arange(trial.size)
-        noise, draw = self.plan.noise, _noise_program(tuple(devices), self.longest)
         return [
-            draw(
-                trial[fill(positions[i : i + size], size)],
-                noise.seed,
-                noise.power * self.plan.benchmark.fs,
-                channels=noise.channels,
-            )
+            draw_on(devices, self.plan.noise, trial[fill(positions[i : i + size], size)],
+                    self.longest, self.plan.benchmark.fs)
             for i in range(0, trial.size, size)
-        ]
+        ]  # fmt: skip
 
     def run(self, controller: str, motion: str, trial: np.ndarray) -> Outcome:
         """Run the trials (T,) of a chunk."""
@@ -195,33 +188,6 @@ class Engine:
             held=np.asarray(watch.held).astype(np.int32),
         )
         return whole[: trial.size]
-
-
-_programs: dict[tuple, object] = {}
-
-
-def _noise_program(devices: tuple, samples: int):
-    """Program that draws the noise of a filled block on its devices, ``LANES`` trials on each.
-
-    The shape on a device never changes, so a trial's noise has the same bits on any of them.
-    """
-    key = devices, samples
-    if key not in _programs:
-        mesh = Mesh(np.array(devices), ("trials",))
-
-        @partial(jax.jit, static_argnames=("channels", "seed"))
-        def draw(trial, seed, variance, channels):
-            local = lambda t: unit_noise(seed, t, samples, channels)  # noqa: E731
-            return jnp.sqrt(variance) * jax.shard_map(
-                local,
-                mesh=mesh,
-                in_specs=P("trials"),
-                out_specs=P(None, None, "trials"),
-                check_vma=False,
-            )(trial)
-
-        _programs[key] = draw
-    return _programs[key]
 
 
 @partial(jax.jit, static_argnums=1)
