@@ -38,7 +38,7 @@ PROGRAMS = {
 }
 #: Programs that compile in their first run.
 COMPILED = ("engine", "numba_blocked", "numba_lanes", "numba_scalar", "jax_plain")
-SLOW_SAMPLES = 3072
+SLOW_SAMPLES = 1536
 #: Rows of J1 and J4 among the 24: whole samples, so they agree or differ by one.
 DELAYS = [0, 1, 6, 7]
 SAMPLE_MS = 1.001 / 1.024
@@ -53,8 +53,8 @@ class Sizes:
 
     trials: int = 1000
     samples: int | None = None  # None: the whole record
-    slow_trials: int = 128
-    rounds: int = 5
+    slow_trials: int = 1000
+    rounds: int = 3
     slow_rounds: int = 2
     cost_rounds: int = 3
     cost_trials: tuple = (1, 10, 100, 250, 500, 1000, 2000, 10000)
