@@ -82,11 +82,21 @@ def summarise(dataset: xr.Dataset) -> Summary:
     if set(PAIR) <= set(dataset.controller.values):
         tables += [_paired(dataset, motion) for motion in dataset.motion.values]
     tables.append(_nominal(dataset))
-    heading = (
-        f"Study of {dataset.sizes['trial'] - 1} uncertain plants, {dataset.sizes['motion']} "
-        f"motions, {dataset.sizes['controller']} controllers, seed {dataset.attrs['seed']}"
+    return Summary(f"Study of {extent(dataset)}", tables)
+
+
+def extent(dataset: xr.Dataset) -> str:
+    """How much was run, in words."""
+
+    def counted(dimension: str, noun: str) -> str:
+        number = dataset.sizes[dimension]
+        return f"{number} {noun}{'' if number == 1 else 's'}"
+
+    plants = dataset.sizes["trial"] - 1  # trial 0 is the nominal plant
+    return (
+        f"{plants} uncertain plant{'' if plants == 1 else 's'}, {counted('motion', 'motion')}, "
+        f"{counted('controller', 'controller')}, seed {dataset.attrs['seed']}"
     )
-    return Summary(heading, tables)
 
 
 def number(value: float) -> str:

@@ -19,7 +19,7 @@ from martths_jax.study.export import _quoted
 from martths_jax.study.files import write_text, writing
 from martths_jax.study.statistics import percentile
 from martths_jax.study.store import RunFolder
-from martths_jax.study.summary import Summary, Table, number
+from martths_jax.study.summary import Summary, Table, extent, number
 from martths_jax.sweep.axes import SCALARS, Axis
 from martths_jax.sweep.config import SHOWN, SweepConfig
 from martths_jax.sweep.grid import cell_numbers
@@ -219,9 +219,4 @@ def summarise(sweep: Sweep, shown: tuple[str, ...]) -> Summary:
             note = "Median / 95th percentile over the uncertain trials that finished."
             tables.append(Table(f"{controller} on {motion}", heads, rows, (note,)))
     sizes = " x ".join(f"{len(a.values)} {a.name}" for a in axes)
-    heading = (
-        f"Sweep of {sizes}: {data.sizes['trial'] - 1} uncertain plants, "
-        f"{data.sizes['motion']} motions, {data.sizes['controller']} controllers, "
-        f"seed {data.attrs['seed']}"
-    )
-    return Summary(heading, tables)
+    return Summary(f"Sweep of {sizes}: {extent(data)}", tables)
