@@ -234,6 +234,18 @@ def fill(which: np.ndarray, size: int) -> np.ndarray:
     return np.concatenate([which, np.full(size - which.size, which[0])])
 
 
+def pick(setup: Setup, which: np.ndarray) -> Controller:
+    """The controller of a setup with its marked leaves at the positions `which` of their axis."""
+    leaves, tree = jax.tree.flatten(setup.controller)
+    return jax.tree.unflatten(
+        tree,
+        [
+            np.asarray(x)[..., which] if own else x
+            for x, own in zip(leaves, setup.per_trial, strict=True)
+        ],
+    )
+
+
 def run_block(
     setup: Setup, plants, noise: jax.Array, which: np.ndarray, devices, keep: bool, retry=True
 ):
@@ -247,12 +259,7 @@ def run_block(
         retry: whether to widen the range of lags where a delay is at its end.
     """
     lanes = fill(which, LANES * len(devices))
-    leaves, tree = jax.tree.flatten(setup.controller)
-    leaves = [
-        np.asarray(x)[..., lanes] if own else x
-        for x, own in zip(leaves, setup.per_trial, strict=True)
-    ]
-    controller = jax.tree.unflatten(tree, leaves)
+    controller = pick(setup, lanes)
     kept = 0 if not keep else FEW if which.size <= FEW else LANES
     own_noise = noise.shape[-1] > 1
     samples = setup.ground.shape[0]

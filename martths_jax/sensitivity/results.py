@@ -8,18 +8,22 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from martths_jax.errors import InputError
 from martths_jax.indices import NAMES
 from martths_jax.sensitivity.design import Design
 from martths_jax.sensitivity.estimators import LEVEL, RESAMPLES, SobolIndices, sobol, verdicts
 from martths_jax.sensitivity.store import ROWS
-from martths_jax.study.dataset import attributes, read_dataset, save_dataset
+from martths_jax.study.dataset import (
+    INDEX_UNITS,
+    STATUS_FLAGS,
+    attributes,
+    read_results,
+    save_dataset,
+)
 from martths_jax.study.export import _quoted
 from martths_jax.study.files import write_text, writing
 from martths_jax.study.plan import Plan
 from martths_jax.study.store import RunFolder
 from martths_jax.study.summary import Summary, Table
-from martths_jax.watch import Status
 
 ESTIMATES = ("first", "first_low", "first_high", "total", "total_low", "total_high")
 _WORDS = {
@@ -92,10 +96,7 @@ def open_sensitivity(folder: str | Path) -> Sensitivity:
     Raises:
         InputError: if there is none, or it is of another version.
     """
-    path = Path(folder) / "sensitivity.nc"
-    if not path.is_file():
-        raise InputError(f"{path} does not exist; give the folder of a finished analysis.")
-    return Sensitivity(read_dataset(path), Path(folder))
+    return Sensitivity(read_results(folder, "sensitivity.nc", "analysis"), Path(folder))
 
 
 def write_results(run: RunFolder, design: Design, plan: Plan) -> Sensitivity:
@@ -130,12 +131,9 @@ def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
             "long_name": "base samples whose runs all finished"}),
         "note": (cell[:2], np.array(notes), {"long_name": "what limits these indices"}),
         "value": (("controller", "sample", "row", "index"), value, {
-            "long_name": "evaluation indices of every run; NaN where it diverged",
-            "units": "ms for J1 and J4 (positive = late), percent for the others"}),
+            "long_name": "evaluation indices of every run; NaN where it diverged"} | INDEX_UNITS),
         "status": (("controller", "sample", "row"), status, {
-            "long_name": "how the run ended",
-            "flag_values": np.array([int(s) for s in Status], dtype=np.int32),
-            "flag_meanings": " ".join(s.name.lower() for s in Status)}),
+            "long_name": "how the run ended"} | STATUS_FLAGS),
         "point": (("sample", "row", "factor"), design.unit, {
             "long_name": "points of the design in the unit cube", "units": "1"}),
     }  # fmt: skip

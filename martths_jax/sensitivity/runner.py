@@ -20,7 +20,7 @@ from martths_jax.study.engine import Outcome, choose_devices
 from martths_jax.study.memory import GB, choose_chunk, lane_bytes
 from martths_jax.study.plan import Plan, build_plan
 from martths_jax.study.progress import Reporter, Tally, compile_seconds
-from martths_jax.study.runner import Session, header
+from martths_jax.study.runner import Session, header, tell_notices
 from martths_jax.sweep.config import SHOWN
 from martths_jax.sweep.lanes import LaneEngine
 from martths_jax.watch import Status
@@ -130,9 +130,7 @@ def make_engine(plan: Plan, design: Design, reporter: Reporter) -> LaneEngine:
         f"{devices[0].platform} device(s), about "
         f"{2 * chunk * lane_bytes(samples, plan.noise.channels) / GB:.2g} GB."
     )
-    for motion in plan.motions:
-        for text in motion.notices:
-            reporter.notice(text)
+    tell_notices(plan.motions, reporter)
     return engine
 
 

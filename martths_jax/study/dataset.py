@@ -22,6 +22,12 @@ from martths_jax.study.store import FORMAT, RunFolder
 from martths_jax.watch import Status
 
 ACTUATORS = np.array([1, 2], dtype=np.int32)
+INDEX_UNITS = {"units": "ms for J1 and J4 (positive = late), percent for the others"}
+#: What the numbers of a status mean, by the conventions of NetCDF.
+STATUS_FLAGS = {
+    "flag_values": np.array([int(s) for s in Status], dtype=np.int32),
+    "flag_meanings": " ".join(s.name.lower() for s in Status),
+}
 #: Longest attribute HDF5 stores in an object's header [bytes].
 LONGEST_ATTRIBUTE = 60_000
 _FIRST_WORDS = {
@@ -53,12 +59,9 @@ def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
     unit = ["ms" if name.startswith(("J1_", "J4_")) else "percent" for name in NAMES]
     variables = {
         "value": ((*cell, "index"), gather(lambda o: o.value), {
-            "long_name": "evaluation indices; NaN where the trial diverged",
-            "units": "ms for J1 and J4 (positive = late), percent for the others"}),
+            "long_name": "evaluation indices; NaN where the trial diverged"} | INDEX_UNITS),
         "status": (cell, gather(lambda o: o.status), {
-            "long_name": "how the trial ended",
-            "flag_values": np.array([int(s) for s in Status], dtype=np.int32),
-            "flag_meanings": " ".join(s.name.lower() for s in Status)}),
+            "long_name": "how the trial ended"} | STATUS_FLAGS),
         "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
             "long_name": "largest valve command", "units": "V"}),
         "held": (cell, gather(lambda o: o.held), {
@@ -159,6 +162,18 @@ def save_dataset(dataset: xr.Dataset, path: Path) -> None:
     """
     with writing(path) as temporary:
         write_dataset(dataset, temporary)
+
+
+def read_results(folder: Path | str, name: str, what: str) -> xr.Dataset:
+    """The result file of a finished run; `what` it is called in the message.
+
+    Raises:
+        InputError: if there is none, or it is of another version.
+    """
+    path = Path(folder) / name
+    if not path.is_file():
+        raise InputError(f"{path} does not exist; give the folder of a finished {what}.")
+    return read_dataset(path)
 
 
 def read_dataset(path: Path, group: str | None = None) -> xr.Dataset:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from martths_jax.errors import InputError
-from martths_jax.study.dataset import read_dataset
+from martths_jax.study.dataset import read_dataset, read_results
 from martths_jax.study.signals import group
 from martths_jax.study.summary import Summary, summarise
 from martths_jax.watch import Status
@@ -73,7 +73,4 @@ def open_study(folder: str | Path) -> Study:
     Raises:
         InputError: if there is none, or it is of another version.
     """
-    path = Path(folder) / "study.nc"
-    if not path.is_file():
-        raise InputError(f"{path} does not exist; give the folder of a finished study.")
-    return Study(read_dataset(path), Path(folder))
+    return Study(read_results(folder, "study.nc", "study"), Path(folder))

@@ -6,6 +6,7 @@ import json
 import os
 import socket
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -122,10 +123,15 @@ def make_engine(plan: Plan, reporter: Reporter) -> Engine:
         f"Seed {plan.config.seed}; {plan.trials} trials and the nominal plant on {count} "
         f"{devices[0].platform} device(s), in chunks of {chunk} trials (about {size / GB:.2g} GB)."
     )
-    for motion in plan.motions:
+    tell_notices(plan.motions, reporter)
+    return engine
+
+
+def tell_notices(motions: Iterable[Motion], reporter: Reporter) -> None:
+    """Pass on what was noticed while the motions were loaded."""
+    for motion in motions:
         for text in motion.notices:
             reporter.notice(text)
-    return engine
 
 
 class Session:

@@ -7,9 +7,7 @@ that cells which differ only in traced scalars share a program and fill the bloc
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -18,7 +16,7 @@ from martths_jax.coupler import build_coupler
 from martths_jax.motions import Motion
 from martths_jax.plant import Plants
 from martths_jax.sensors import unit_noise
-from martths_jax.simulation import LANES, Setup, fill, reference_response, run_block
+from martths_jax.simulation import LANES, Setup, fill, pick, reference_response, run_block
 from martths_jax.study.config import StudyConfig
 from martths_jax.study.engine import Engine, Outcome
 from martths_jax.study.plan import Plan, motion_names
@@ -45,7 +43,7 @@ class NoiseStore:
         self.unit = np.empty((self.samples, self.channels, trial.size))
         for i in range(0, trial.size, LANES):
             which = np.arange(i, min(i + LANES, trial.size))
-            drawn = _draw(trial[fill(which, LANES)], self.seed, self.samples, self.channels)
+            drawn = unit_noise(self.seed, trial[fill(which, LANES)], self.samples, self.channels)
             self.unit[..., which] = np.asarray(drawn)[..., : which.size]
         self.trial = trial
 
@@ -60,21 +58,6 @@ class NoiseStore:
             noise[..., run[0] : run[-1] + 1] = self.unit[:samples, :, first : first + run.size]
         noise *= deviation
         return noise
-
-
-@partial(jax.jit, static_argnums=(1, 2, 3))
-def _draw(trial, seed, samples, channels):
-    return unit_noise(seed, trial, samples, channels)
-
-
-def lanes_of(setup: Setup, cell: np.ndarray) -> Setup:
-    """Setup of lanes (L,), from one whose controller's marked leaves end in an axis of cells."""
-    leaves, tree = jax.tree.flatten(setup.controller)
-    leaves = [
-        np.asarray(x)[..., cell] if own else x
-        for x, own in zip(leaves, setup.per_trial, strict=True)
-    ]
-    return replace(setup, controller=jax.tree.unflatten(tree, leaves))
 
 
 class LaneEngine(Engine):
@@ -96,7 +79,7 @@ class LaneEngine(Engine):
             noise_trial: (L,) trials whose noise the lanes see, loaded in ``store``.
             power: (L,) power of their noise [mm^2 s].
         """
-        setup = lanes_of(cells, cell)
+        setup = replace(cells, controller=pick(cells, cell))
         lanes = fill(np.arange(cell.size), self.block)
         deviation = np.sqrt(np.asarray(power) * setup.benchmark.fs)
         noise = self.store.block(

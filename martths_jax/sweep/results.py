@@ -10,10 +10,15 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from martths_jax.errors import InputError
 from martths_jax.indices import NAMES
 from martths_jax.plant import PARAMETERS
-from martths_jax.study.dataset import attributes, read_dataset, save_dataset
+from martths_jax.study.dataset import (
+    INDEX_UNITS,
+    STATUS_FLAGS,
+    attributes,
+    read_results,
+    save_dataset,
+)
 from martths_jax.study.engine import FIRSTS
 from martths_jax.study.export import _quoted
 from martths_jax.study.files import write_text, writing
@@ -93,10 +98,7 @@ def open_sweep(folder: str | Path) -> Sweep:
     Raises:
         InputError: if there is none, or it is of another version.
     """
-    path = Path(folder) / "sweep.nc"
-    if not path.is_file():
-        raise InputError(f"{path} does not exist; give the folder of a finished sweep.")
-    return Sweep(read_dataset(path), Path(folder))
+    return Sweep(read_results(folder, "sweep.nc", "sweep"), Path(folder))
 
 
 def write_results(run: RunFolder, config: SweepConfig) -> Sweep:
@@ -134,12 +136,9 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
     cell = (*names, "controller", "motion", "trial")
     variables = {
         "value": ((*cell, "index"), gather(lambda o: o.value), {
-            "long_name": "evaluation indices; NaN where the trial diverged",
-            "units": "ms for J1 and J4 (positive = late), percent for the others"}),
+            "long_name": "evaluation indices; NaN where the trial diverged"} | INDEX_UNITS),
         "status": (cell, gather(lambda o: o.status), {
-            "long_name": "how the trial ended",
-            "flag_values": np.array([int(s) for s in Status], dtype=np.int32),
-            "flag_meanings": " ".join(s.name.lower() for s in Status)}),
+            "long_name": "how the trial ended"} | STATUS_FLAGS),
         "held": (cell, gather(lambda o: o.held), {
             "long_name": "fits that the controller did not use", "units": "1"}),
         "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {

@@ -18,7 +18,7 @@ from martths_jax.study.engine import Outcome, choose_devices
 from martths_jax.study.memory import GB, choose_chunk, lane_bytes
 from martths_jax.study.plan import Plan, build_controller, build_plan, motion_identity
 from martths_jax.study.progress import Reporter, Tally, compile_seconds
-from martths_jax.study.runner import Session, header
+from martths_jax.study.runner import Session, header, tell_notices
 from martths_jax.sweep.config import SHOWN, SweepConfig, make_sweep
 from martths_jax.sweep.grid import Job, job_config
 from martths_jax.sweep.lanes import LaneEngine, Worlds
@@ -159,9 +159,7 @@ def make_engine(base: Plan, worlds: Worlds, sweep: SweepConfig, reporter: Report
                 f"{controller} has not all of the axes: {len(set(jobs))} of its {len(jobs)} cells "
                 "are distinct, and each is run once."
             )
-    for motion in base.motions:
-        for text in motion.notices:
-            reporter.notice(text)
+    tell_notices(base.motions, reporter)
     return engine
 
 
