@@ -12,6 +12,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from martths_jax.once import once
+
 MM = 1e3  # mm per m
 
 
@@ -36,6 +38,7 @@ def build_coupler(
     return Coupler(arm=jnp.asarray(arm), alpha=jnp.asarray(np.deg2rad(alpha_deg)))
 
 
+@once
 def frame_to_actuator(coupler: Coupler, interface: jax.Array) -> jax.Array:
     """Strokes that put the interface where it is wanted.
 
@@ -58,6 +61,7 @@ def frame_to_actuator(coupler: Coupler, interface: jax.Array) -> jax.Array:
     return MM * jnp.stack([common + skew, common - skew])
 
 
+@once
 def actuator_to_frame(coupler: Coupler, strokes_mm: jax.Array) -> jax.Array:
     """Interface motion that belongs to two strokes: the inverse of ``frame_to_actuator``.
 
@@ -70,12 +74,12 @@ def actuator_to_frame(coupler: Coupler, strokes_mm: jax.Array) -> jax.Array:
     Returns:
         (2, ...) translation of node 4 [m] and rotation [rad]; NaN where no position fits.
     """
-    x_1, x_2 = strokes_mm / MM
-    sine = (x_1 - x_2) / (2 * coupler.arm * jnp.sin(coupler.alpha))
-    cosine = jnp.sqrt(1 - sine**2)
-    # The mean stroke is x_4 + p cos(alpha) (cos(theta) - 1), with 1 - cos = sin^2 / (1 + cos).
-    drop = coupler.arm * jnp.cos(coupler.alpha) * sine**2 / (1 + cosine)
-    return jnp.stack([(x_1 + x_2) / 2 + drop, _angle(sine, cosine)])
+    x_1, x_2 = strokes_mm * (1 / MM)
+    sine = (x_1 - x_2) * (1 / (2 * coupler.arm * jnp.sin(coupler.alpha)))
+    half = sine / (1 + jnp.sqrt(1 - sine * sine))  # tan(theta / 2)
+    # The mean stroke is x_4 + p cos(alpha) (cos(theta) - 1), with 1 - cos = sin tan(theta / 2).
+    drop = coupler.arm * jnp.cos(coupler.alpha) * sine * half
+    return jnp.stack([(x_1 + x_2) * 0.5 + drop, _angle(half)])
 
 
 def _sine(x: jax.Array) -> jax.Array:
@@ -85,17 +89,16 @@ def _sine(x: jax.Array) -> jax.Array:
     """
     square, series = x * x, 1.0
     for n in range(8, 0, -1):
-        series = 1.0 - square / (2 * n * (2 * n + 1)) * series
+        series = 1.0 - square * (1 / (2 * n * (2 * n + 1))) * series
     return x * series
 
 
-def _angle(sine: jax.Array, cosine: jax.Array) -> jax.Array:
-    """Angle in [-1, 1] rad with the given sine and cosine, to the last digit.
+def _angle(half: jax.Array) -> jax.Array:
+    """Angle in [-1, 1] rad with the given tangent of its half, to the last digit.
 
-    Two half-angle steps tan(a/2) = tan(a) / (1 + sqrt(1 + tan(a)^2)) bring the argument under
+    A second half-angle step tan(a/2) = tan(a) / (1 + sqrt(1 + tan(a)^2)) brings the argument under
     0.26, where the series of the arc tangent is short.
     """
-    half = sine / (1 + cosine)
     quarter = half / (1 + jnp.sqrt(1 + half * half))
     square, series = quarter * quarter, 0.0
     for n in range(14, 0, -1):

@@ -18,12 +18,11 @@ from martths_jax.benchmark import Benchmark
 from martths_jax.controllers import Controller, Observation
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
 from martths_jax.indices import IndexSums, blank_sums, correlate, pairs
+from martths_jax.once import computed, once
 from martths_jax.structure.modal import ModalSystem, advance, contract, output
 
 #: Length of the time loop's windows for controllers that keep none [samples].
 WINDOW = 1024
-#: Shapes, before the trials, of the signals that running sums and watch read.
-BOOKED = {"x_a": (2,), "x_m": (2,), "x_hat": (2,), "u": (2,), "num": (6,), "est": (2,), "held": ()}
 
 
 @jax.tree_util.register_dataclass
@@ -89,18 +88,16 @@ def sample_period(
     # acceleration are backward differences, zero at the first sample.
     interface = actuator_to_frame(benchmark.coupler, estimate)
     before = jnp.where(k == 0, interface, state.interface)
-    force = contract(benchmark.restoring[0], interface)
-    force += contract(benchmark.restoring[1], before[0])
-    force += contract(benchmark.restoring[2], before[1])
+    force = restoring_force(benchmark.restoring, interface, before)
 
     # Numerical substructure under its own inertia and that force.
-    load = jnp.concatenate([jnp.broadcast_to(ground, force[:1].shape), -force])
+    load = [ground, *-force]
     numerical = output(benchmark.numerical, state.structure, load)
     target = frame_to_actuator(benchmark.coupler, numerical[:2])
 
     seen = Observation(k, benchmark.dt, target, measured, estimate, corrected, delayed)
     controller_state, decision = controller.step(state.controller, seen)
-    command = decision.command_mm
+    command = computed(decision.command_mm)
 
     after = LoopState(
         structure=advance(benchmark.numerical, state.structure, load),
@@ -119,6 +116,14 @@ def sample_period(
         "force": force,
     }
     return after, signals | decision.signals, decision.record
+
+
+@once
+def restoring_force(taps, interface, before):
+    """Force (3, T) of the experimental frame from its motion at k, k-1 and k-2 (2, T) each."""
+    force = contract(taps[0], interface)
+    force = contract(taps[1], before[0], start=force)
+    return contract(taps[2], before[1], start=force)
 
 
 def run(
@@ -164,34 +169,28 @@ def run(
     rows = ground.shape[0]
     N = rows if samples is None else samples
     length = controller.window or WINDOW
-    windows = rows // length + 1  # one sample more than the motion, which books the last one
+    windows = -(-rows // length)
 
-    def in_windows(x, late=0):
-        padded = jnp.pad(x, [(late, windows * length - rows - late)] + [(0, 0)] * (x.ndim - 1))
+    def in_windows(x):
+        padded = jnp.pad(x, [(0, windows * length - rows)] + [(0, 0)] * (x.ndim - 1))
         return padded.reshape(windows, length, *x.shape[1:])
 
     def sample(moving, inputs):
-        state, done, *booked = moving
-        k, ground_k, reference_done, noise_k, delayed = inputs
-        # The sums read the signals of the sample before from the carry: what is carried is computed
-        # once, while the compiler repeats the arithmetic of other values in all that read them.
-        valid = (k > 0) & (k <= N)
-        booked = _book(booked, done, reference_done[:, None], k - 1, valid, tally)
-        strokes = tuple(
-            jnp.where(valid, done[name][i], 0.0)
-            for name in ("x_a", "x_m", "x_hat")
-            for i in range(2)
-        )
+        state, *booked = moving
+        k, ground_k, reference_k, noise_k, delayed = inputs
         state, signals, record = sample_period(
             benchmark, controller, plant, state, k, ground_k, noise_k, delayed
         )
-        done = {name: signals.get(name, x) for name, x in done.items()}
+        valid = k < N
+        booked = _book(booked, signals, reference_k[:, None], k, valid, tally)
+        strokes = jnp.concatenate([signals[name] for name in ("x_a", "x_m", "x_hat")])
         kept = {name: x[..., :keep] for name, x in signals.items()} if keep else {}
-        return (state, done, *booked), (strokes, record, kept)
+        return (state, *booked), (jnp.where(valid, strokes, 0.0), record, kept)
 
     def piece(carry, inputs):
         moving, tail, correlation = carry
         moving, (strokes, records, signals) = jax.lax.scan(sample, moving, inputs)
+        strokes = tuple(strokes[:, i] for i in range(6))
         added, tail = _correlate_window(tail, strokes, lags)
         return (moving, tail, jax.tree.map(jnp.add, correlation, added)), (records, signals)
 
@@ -213,18 +212,17 @@ def run(
     blank = controller.blank_record(trials)
     records = jax.tree.map(lambda x: jnp.zeros((length, *x.shape), x.dtype), blank)
     state = initial_state(benchmark, controller, plant, trials)
-    done = {name: jnp.zeros((*shape, trials)) for name, shape in BOOKED.items()}
     extra = None if tally is None else tally.init(trials)
     carry = (
         records,
         (
-            (state, done, blank_sums(trials), watching.init(trials), extra),
+            (state, blank_sums(trials), watching.init(trials), extra),
             (jnp.zeros((sum(lags), trials)),) * 6,
             (jnp.zeros((sum(lags) + 1, trials)),) * 4,
         ),
     )
     numbers = jnp.arange(windows * length).reshape(windows, length)
-    inputs = (numbers, in_windows(ground), in_windows(reference, late=1), in_windows(noise))
+    inputs = (numbers, in_windows(ground), in_windows(reference), in_windows(noise))
     if samples is None:
         carry, signals = jax.lax.scan(window, carry, inputs)
     else:
@@ -239,9 +237,9 @@ def run(
             put = jax.lax.dynamic_update_index_in_dim
             return carry, jax.tree.map(lambda x, row: put(x, row, i, 0), signals, new)
 
-        carry, signals = jax.lax.fori_loop(0, N // length + 1, one, (carry, blank))
+        carry, signals = jax.lax.fori_loop(0, -(-N // length), one, (carry, blank))
 
-    _, ((_, _, sums, watch, extra), tail, correlation) = carry
+    _, ((_, sums, watch, extra), tail, correlation) = carry
     # The last `lead` samples still wait for targets that come after them: none do.
     nothing = (jnp.zeros((lags[0], trials)),) * 6
     correlation = jax.tree.map(jnp.add, correlation, _correlate_window(tail, nothing, lags)[0])

@@ -16,10 +16,14 @@ def _backend_is_up() -> bool:
     return bool(bridge is not None and bridge.backends_are_initialized())
 
 
-#: Back-end option (XLA ignores those it does not know) that compiles a time loop into one kernel
-#: instead of a list of some hundred kernels that are started one by one, each for half a
-#: microsecond: three times faster here.  It acts on every while loop of the process.
-XLA_EXTRA_OPTIONS = "xla_cpu_small_while_loop_byte_threshold=1000000000000"
+#: Back-end options (XLA ignores those it does not know), which act on the whole process.  The first
+#: compiles a time loop into one kernel instead of a list of some hundred kernels that are started
+#: one by one, each for half a microsecond: three times faster here.  The second leaves loops over
+#: the trials as loops of vector operations; LLVM would write many of them out trial by trial
+#: before it looks for vectors, which costs a third more time to compile and some to run.
+XLA_EXTRA_OPTIONS = (
+    "xla_cpu_small_while_loop_byte_threshold=1000000000000,xla_cpu_disable_loop_unrolling"
+)
 #: Options of the simulation's programs: vectors of the full AVX-512 width; no library calls for
 #: small matrix products, which would keep the loop from becoming one kernel; XLA's older code
 #: generator for fused operations, which compiles a third faster to code of the same speed.
@@ -89,7 +93,7 @@ def usable_cores() -> int:
 
 
 def configure() -> None:
-    """Float64, kept programs, one XLA device per core, and the measured compiler option.
+    """Float64, kept programs, one XLA device per core, and the measured compiler options.
 
     Runs when the package is imported.  The last two need a JAX that has not started yet: if a
     program used JAX before importing this package they are left alone, which costs speed and

@@ -295,9 +295,13 @@ def _trial_first(signal: jax.Array, samples: int) -> np.ndarray:
     return each.reshape(-1, *each.shape[2:])
 
 
-@partial(jax.jit, static_argnums=1)
 def fit(x: jax.Array, length: int) -> jax.Array:
     """(N, ...) cut or filled up with zeros to (length, ...)."""
+    return x if x.shape[0] == length else _fit(x, length)
+
+
+@partial(jax.jit, static_argnums=1)
+def _fit(x: jax.Array, length: int) -> jax.Array:
     return jnp.pad(x[:length], [(0, max(0, length - x.shape[0]))] + [(0, 0)] * (x.ndim - 1))
 
 
@@ -363,7 +367,7 @@ def draw_noise(noise, trial, samples: int, fs: float, lanes=None) -> jax.Array:
 
 
 def draw_on(devices, noise: SensorNoise, trial: np.ndarray, samples: int, fs: float) -> jax.Array:
-    """(N, 1 or 2, T) noise of a filled block, drawn on the devices that run it [mm].
+    """Noise of a filled block, drawn on the devices that run it [mm].
 
     Args:
         devices: each draws ``LANES`` trials, so that a trial's noise has the same bits on any.
@@ -371,6 +375,9 @@ def draw_on(devices, noise: SensorNoise, trial: np.ndarray, samples: int, fs: fl
         trial: (T,) trial numbers, ``LANES`` a device.
         samples: length N.
         fs: sampling rate [Hz].
+
+    Returns:
+        (``room_for(N)``, 1 or 2, T), zeros beyond N: as ``run_block`` needs it, without a copy.
     """
     program = noise_program(tuple(devices), samples, noise.channels)
     return program(jnp.asarray(trial), noise.seed, noise.power * fs)
@@ -382,7 +389,8 @@ def noise_program(devices: tuple, samples: int, channels: int):
     mesh = Mesh(np.array(devices), ("trials",))
 
     def draw(trial, seed, variance):
-        local = lambda t: unit_noise(seed, t, samples, channels)  # noqa: E731
+        room = room_for(samples)
+        local = lambda t: fit(unit_noise(seed, t, samples, channels), room)  # noqa: E731
         return jnp.sqrt(variance) * jax.shard_map(
             local,
             mesh=mesh,
@@ -391,7 +399,7 @@ def noise_program(devices: tuple, samples: int, channels: int):
             check_vma=False,
         )(trial)
 
-    return jax.jit(draw, static_argnums=1)
+    return jax.jit(draw, static_argnums=1, compiler_options=compiler_options())
 
 
 def lag_range(attempt: int, fs: float) -> tuple[int, int]:

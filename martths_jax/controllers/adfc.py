@@ -20,6 +20,7 @@ from martths_jax.controllers.base import Controller, Decision
 from martths_jax.controllers.inverse import nominal_inverse
 from martths_jax.errors import argument_error, raise_all
 from martths_jax.kalman import design_kalman
+from martths_jax.once import once
 
 #: Backward differences of second order for value and dt^j times the j-th derivative, from
 #: samples k, k-1, ..., k-4 (the paper's C_D, scaled so that the columns stay comparable).
@@ -145,15 +146,9 @@ class ADFC(Controller):
         taps = ((zero,) * (TAPS - 1),) * 2
         start = tuple(tuple(jnp.broadcast_to(c, (trials,)) for c in row) for row in self.start)
         return {
-            # The last fit and whether it is used, and the coefficients before it.  Carrying the
-            # fit itself, not what is chosen from it, makes the compiler compute it once; otherwise
-            # it repeats the back substitution in everything that reads a coefficient.
-            "fitted": start,
-            "use": jnp.zeros(trials, dtype=bool),
             "coefficients": start,
-            # Normal equations of the rows of the last window that are still in the buffer, and of
-            # the rows of this window.
-            "old": ls.zeros(8, 2, trials),
+            # Normal equations of all rows in the buffer, and of those of this window alone.
+            "rows": ls.zeros(8, 2, trials),
             "new": ls.zeros(8, 2, trials),
             # Backward differences of order 0 to 3, see ``regress``, of both estimates, of the
             # estimates N_b samples ago, and of both targets.
@@ -177,25 +172,21 @@ class ADFC(Controller):
         # u(k-1) is the last command that the estimate at k can have felt.
         applied = state["command"]
         new = ls.add_observation(state["new"], phi, applied)
-        old = ls.add_observation(state["old"], phi_leaving, left[2:], sign=-1.0)
+        rows = ls.exchange_observation(state["rows"], phi, applied, phi_leaving, left[2:])
         # The first fit waits until no row in the buffer reaches back before the first sample.
         since_full, hop = seen.k - (self.nb + TAPS - 1), self.nb - self.no
         due = (since_full >= 0) & (since_full % hop == 0)
-        normal = ls.pulled(ls.add(old, new), self.pull, self.anchor)
+        normal = ls.pulled(rows, self.pull, self.anchor)
         fitted, tolerance = ls.SOLVERS[self.solver](normal)
         good = tolerance >= 1 / CONDITION_LIMIT  # false for NaN
         held = state["held"] + jnp.where(due & ~good, 1.0, 0.0)
-        previous = choose(state["use"], state["fitted"], state["coefficients"])
-        use = due & good
-        coefficients = choose(use, fitted, previous)
+        coefficients = choose(due & good, fitted, state["coefficients"])
         command = tuple(
             sum(c[i] * p for c, p in zip(coefficients, phi_target, strict=True)) for i in range(2)
         )
         state = {
-            "coefficients": previous,
-            "fitted": tuple(map(tuple, fitted)),
-            "use": use,
-            "old": old,
+            "coefficients": coefficients,
+            "rows": rows,
             "new": new,
             "estimate": estimate,
             "leaving": leaving,
@@ -211,12 +202,12 @@ class ADFC(Controller):
         return state, decision
 
     def turn(self, state):
-        """Start a new window: the fresh sum of its rows replaces the sliding difference.
+        """Start a new window: the fresh sum of the last one's rows replaces the sliding sum.
 
         Adding and subtracting rows for ever would let round-off grow with the record; here every
         sum is at most two windows old.
         """
-        return state | {"old": state["new"], "new": jax.tree.map(jnp.zeros_like, state["new"])}
+        return state | {"rows": state["new"], "new": jax.tree.map(jnp.zeros_like, state["new"])}
 
 
 def choose(use, new, old):
@@ -227,6 +218,7 @@ def choose(use, new, old):
     )
 
 
+@once
 def regress(before, newest: jax.Array):
     """Regressor phi = [C_D x_1, C_D x_2] and the differences to remember for the next one.
 

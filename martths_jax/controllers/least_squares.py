@@ -14,6 +14,8 @@ from collections.abc import Sequence
 import jax
 import jax.numpy as jnp
 
+from martths_jax.once import once
+
 Rows = tuple[tuple[jax.Array, ...], ...]
 
 
@@ -23,10 +25,8 @@ def zeros(unknowns: int, sides: int, trials: int) -> Rows:
     return tuple((zero,) * (unknowns - j + sides) for j in range(unknowns))
 
 
-def add_observation(
-    rows: Rows, phi: Sequence[jax.Array], values: Sequence[jax.Array], sign: float = 1.0
-) -> Rows:
-    """Add (sign 1) or take away (sign -1) one observation phi' c = values.
+def add_observation(rows: Rows, phi: Sequence[jax.Array], values: Sequence[jax.Array]) -> Rows:
+    """Add one observation phi' c = values.
 
     Args:
         phi: n regressors (T,).
@@ -34,14 +34,21 @@ def add_observation(
     """
     both = [*phi, *values]
     return tuple(
-        tuple(g + sign * (phi[j] * v) for g, v in zip(row, both[j:], strict=True))
+        tuple(g + phi[j] * v for g, v in zip(row, both[j:], strict=True))
         for j, row in enumerate(rows)
     )
 
 
-def add(a: Rows, b: Rows) -> Rows:
-    """Sum of two sets of normal equations."""
-    return jax.tree.map(jnp.add, a, b)
+def exchange_observation(rows: Rows, phi, values, phi_leaving, values_leaving) -> Rows:
+    """Add one observation and take another away, see ``add_observation``."""
+    entering, leaving = [*phi, *values], [*phi_leaving, *values_leaving]
+    return tuple(
+        tuple(
+            g + phi[j] * e - phi_leaving[j] * l
+            for g, e, l in zip(row, entering[j:], leaving[j:], strict=True)
+        )
+        for j, row in enumerate(rows)
+    )
 
 
 def pulled(rows: Rows, weight, towards: jax.Array) -> Rows:
@@ -75,25 +82,39 @@ def solve_ldl(rows: Rows) -> tuple[list[list[jax.Array]], jax.Array]:
         power which those before it do not explain; its inverse is a lower bound of the condition
         number of G scaled to a unit diagonal.  NaN or not positive for a singular G.
     """
+    work, tolerance = _eliminate(rows)
+    return _substitute(work), tolerance
+
+
+@once
+def _eliminate(rows: Rows):
+    """Unit upper factor and D^-1 L^-1 h as packed rows, and the smallest relative pivot."""
     n = len(rows)
     work = [list(row) for row in rows]
-    tolerance = jnp.ones_like(rows[0][0])
+    worst = jnp.ones_like(rows[0][0])
     for j in range(n):
-        # NaN wins over any number in `minimum`, so a broken pivot stays visible.
-        tolerance = jnp.minimum(tolerance, work[j][0] / rows[j][0])
         inverse = 1.0 / work[j][0]
+        # A pivot that is not positive counts as none; a multiplication saves the second division.
+        worst = jnp.maximum(worst, jnp.where(inverse > 0, rows[j][0] * inverse, jnp.inf))
         scaled = [value * inverse for value in work[j]]
         for i in range(j + 1, n):
             for m in range(len(work[i])):
                 work[i][m] = work[i][m] - scaled[i - j] * work[j][i - j + m]
         work[j] = scaled
+    return work, 1.0 / worst
+
+
+@once
+def _substitute(work):
+    """Solution of the unit upper system: c[j][side]."""
+    n = len(work)
     solution: list[list[jax.Array]] = [[]] * n
     for j in reversed(range(n)):
         value = work[j][n - j :]
         for i in range(j + 1, n):
             value = [v - work[j][i - j] * c for v, c in zip(value, solution[i], strict=True)]
         solution[j] = value
-    return solution, tolerance
+    return solution
 
 
 def solve_lu(rows: Rows) -> tuple[list[list[jax.Array]], jax.Array]:

@@ -17,6 +17,8 @@ import jax.numpy as jnp
 import numpy as np
 from scipy import linalg
 
+from martths_jax.once import once
+
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
@@ -43,41 +45,50 @@ class ModalSystem:
         return 2 * self.a.shape[1]
 
 
-def contract(matrix: jax.Array, x: jax.Array, axes: int = 1) -> jax.Array:
+def chain(columns, rows, start=None) -> jax.Array:
+    """start + sum_i columns[i] * rows[i], one fused multiply-add after the other.
+
+    XLA on CPUs turns a sum over a short axis, or a product of small matrices, into scalar code.
+    """
+    total = start
+    for column, row in zip(columns, rows, strict=True):
+        total = column * row if total is None else total + column * row
+    return total
+
+
+def contract(matrix: jax.Array, x, axes: int = 1, start=None) -> jax.Array:
     """Product of a matrix, shared or one a trial, with batched vectors.
 
     Args:
         matrix: (o, *n) shared or (o, *n, T) one a trial, with `axes` input axes n.
-        x: (*n, T).
+        x: (*n, T); for one axis also a list of rows (T,) and scalars.
         axes: number of axes that are summed.
+        start: (o, T) to add to; zero if it is not given.
     """
-    flat = x.reshape(-1, x.shape[-1])
-    if matrix.ndim == axes + 1:
-        return matrix.reshape(matrix.shape[0], -1) @ flat
-    matrix = matrix.reshape(matrix.shape[0], -1, matrix.shape[-1])
-    # Written as a chain, since XLA turns a sum over a short axis into slow scalar code on CPUs.
-    return sum(matrix[:, i] * flat[i] for i in range(flat.shape[0]))
+    trials = matrix.shape[-1] if matrix.ndim == axes + 2 else 1
+    matrix = matrix.reshape(matrix.shape[0], -1, trials)
+    rows = x if axes == 1 else x.reshape(-1, x.shape[-1])
+    return chain([matrix[:, i] for i in range(matrix.shape[1])], rows, start)
 
 
-def spread(matrix: jax.Array, u: jax.Array) -> jax.Array:
-    """B u for B (2, m, i), shared or (2, m, i, T), and u (i, T) -> (2, m, T)."""
+def spread(matrix: jax.Array, u) -> jax.Array:
+    """B u for B (2, m, i), shared or (2, m, i, T), and i rows u, each (T,) or a scalar."""
     if matrix.ndim == 3:
-        product = matrix.reshape(-1, matrix.shape[-1]) @ u
-        return product.reshape(*matrix.shape[:2], -1)
-    return sum(matrix[:, :, i] * u[i] for i in range(u.shape[0]))
+        matrix = matrix[..., None]
+    return chain([matrix[:, :, i] for i in range(matrix.shape[2])], u)
 
 
-def advance(system: ModalSystem, x: jax.Array, u: jax.Array) -> jax.Array:
-    """State after one step: x (2, m, T), inputs u (i, T) -> (2, m, T)."""
-    return system.a * x + system.b * x[::-1] + spread(system.B, u)
+@once
+def advance(system: ModalSystem, x: jax.Array, u) -> jax.Array:
+    """State after one step: x (2, m, T), i rows of inputs u, each (T,) or a scalar -> (2, m, T)."""
+    return spread(system.B, u) + system.a * x + system.b * x[::-1]
 
 
-def output(system: ModalSystem, x: jax.Array, u: jax.Array | None = None) -> jax.Array:
-    """Outputs (o, T) of the state x (2, m, T), with the inputs u (i, T) where D is not None."""
-    y = contract(system.C, x, axes=2)
-    if system.D is not None:
-        y = y + contract(system.D, u)
-    return y
+@once
+def output(system: ModalSystem, x: jax.Array, u=None) -> jax.Array:
+    """Outputs (o, T) of the state x (2, m, T), with the inputs u (as above) where D is not None."""
+    start = None if system.D is None else contract(system.D, u)
+    return contract(system.C, x, axes=2, start=start)
 
 
 @jax.jit

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -148,14 +147,11 @@ class Engine:
     def run(self, controller: str, motion: str, trial: np.ndarray) -> Outcome:
         """Run the trials (T,) of a chunk."""
         setup = self.setup(controller, motion)
-        samples = setup.ground.shape[0]
         plants = self.plan.draws.plants(trial)
         blocks = []
         for i, noise in enumerate(self.noise(trial)):
             which = np.arange(i * self.block, min((i + 1) * self.block, trial.size))
-            sums, watch, _ = run_block(
-                setup, plants, _cut(noise, samples), which, self.devices, keep=False
-            )
+            sums, watch, _ = run_block(setup, plants, noise, which, self.devices, keep=False)
             blocks.append(self._outcome(setup, sums, watch, trial[which]))
         return Outcome.join(blocks)
 
@@ -166,7 +162,7 @@ class Engine:
         _, _, signals = run_block(
             setup,
             self.plan.draws.plants(trial),
-            _cut(noise, setup.ground.shape[0]),
+            noise,
             np.arange(trial.size),
             [device],
             keep=True,
@@ -188,13 +184,3 @@ class Engine:
             held=np.asarray(watch.held).astype(np.int32),
         )
         return whole[: trial.size]
-
-
-@partial(jax.jit, static_argnums=1)
-def _shortened(noise: jax.Array, samples: int) -> jax.Array:
-    return noise[:samples]
-
-
-def _cut(noise: jax.Array, samples: int) -> jax.Array:
-    """The first samples of the noise: what a shorter motion would have drawn."""
-    return noise if noise.shape[0] == samples else _shortened(noise, samples)

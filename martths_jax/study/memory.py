@@ -5,19 +5,20 @@ from __future__ import annotations
 import psutil
 
 from martths_jax.errors import InputError
+from martths_jax.simulation import room_for
 
 GB = 1e9
 #: Most blocks in a chunk: more would save no time and lose more work when a run is killed.
 MOST_BLOCKS = 16
-#: Noise of a block as drawn, shortened and in the loop's windows, while the next one is drawn.
-COPIES = 4
+#: Noise as kept for the chunk, and once more for what exists while a block is drawn.
+COPIES = 2
 #: A chunk's noise is kept below this, however much memory is free [bytes].
 ENOUGH = 0.5e9
 
 
 def lane_bytes(samples: int, channels: int) -> int:
     """Memory that one trial of a chunk takes [bytes]: its noise, the rest is small."""
-    return 8 * samples * channels * COPIES
+    return 8 * room_for(samples) * channels * COPIES
 
 
 def choose_chunk(

@@ -80,11 +80,11 @@ def slide(rows, nb, turn):
     """Normal equations after all rows by adding the newest and taking the oldest away."""
 
     def one(sums, pair):
-        old, new = sums
+        whole, new = sums
         entering, leaving = pair
-        new = ls.add_observation(new, entering[:8], entering[8:])
-        old = ls.add_observation(old, leaving[:8], leaving[8:], sign=-1.0)
-        return (old, new), None
+        both = (entering[:8], entering[8:]), (leaving[:8], leaving[8:])
+        whole = ls.exchange_observation(whole, *both[0], *both[1])
+        return (whole, ls.add_observation(new, *both[0])), None
 
     window = jax.jit(lambda sums, pairs: jax.lax.scan(one, sums, pairs)[0])
     sums = (ls.zeros(8, 2, 3),) * 2
@@ -92,9 +92,9 @@ def slide(rows, nb, turn):
     for first in range(0, len(rows), nb):
         sums = window(sums, (rows[first : first + nb], leaving[first : first + nb]))
         if first + nb <= len(rows):
-            state = turn({"old": sums[0], "new": sums[1]})
-            sums = (state["old"], state["new"])
-    return ls.full_matrices(ls.add(*sums))
+            state = turn({"rows": sums[0], "new": sums[1]})
+            sums = (state["rows"], state["new"])
+    return ls.full_matrices(sums[0])
 
 
 def relative_error(found, rows, nb):
@@ -110,7 +110,7 @@ def relative_error(found, rows, nb):
 
 
 def test_refreshed_sliding_sums_do_not_drift(dying_rows):
-    """The end lies inside a window: part of the sum is old, part is new."""
+    """The end lies inside a window, so that rows of the last and of this one are in the sum."""
     nb = 1024
     assert len(dying_rows) % nb
     refreshed = slide(dying_rows, nb, ADFC(nb=nb).turn)
