@@ -55,7 +55,7 @@ def cache_folder() -> Path | None:
     None for none: ``MARTHS_CACHE=off``, or there is no home folder.
     """
     if (given := os.environ.get("MARTHS_CACHE")) is not None:
-        return None if given.lower() in ("", "0", "off", "no") else Path(given).expanduser()
+        return None if given.lower() in ("", "0", "off", "no") else Path(os.path.expanduser(given))
     try:
         if sys.platform == "win32":
             base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"

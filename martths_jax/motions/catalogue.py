@@ -36,7 +36,7 @@ def records_folder(records: str | os.PathLike | None = None) -> Path | None:
     given = records if records is not None else os.environ.get(RECORDS_VARIABLE) or None
     if given is None:
         return None
-    folder = Path(given).expanduser()
+    folder = at_home(given)
     if not folder.is_dir():
         origin = "Argument `records` (--records)" if records is not None else f"${RECORDS_VARIABLE}"
         raise InputError(f"{origin} must name a folder of ground motions, but {folder} is none.")
@@ -60,7 +60,7 @@ def _by_name(files: list[Path]) -> dict[str, Path]:
 
 def find_file(path_or_name: str, records: str | os.PathLike | None = None) -> Path:
     """The file that a path or a name (of a file under the folder of records) stands for."""
-    path = Path(path_or_name).expanduser()
+    path = at_home(path_or_name)
     if _is_file(path):
         return path
     available = record_files(records)
@@ -73,6 +73,14 @@ def find_file(path_or_name: str, records: str | os.PathLike | None = None) -> Pa
     if len(matches) == 1:
         return matches[0]
     raise InputError(_not_found(path_or_name, path, available, matches, records))
+
+
+def at_home(path: str | os.PathLike) -> Path:
+    """A path with ~ replaced; left as it is where there is no such user or it cannot be a path."""
+    try:
+        return Path(os.path.expanduser(path))
+    except ValueError:  # a null byte
+        return Path(path)
 
 
 def _is_file(path: Path) -> bool:

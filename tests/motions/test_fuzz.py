@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
@@ -127,6 +127,8 @@ def test_tables_of_odd_numbers(rows, separator, chosen):
 
 @FEW
 @given(st.text(max_size=40), st.text(max_size=20))
+@example("~\0", "")
+@example("~nobody-is-called-this/motion.mat", "")
 def test_any_name(name, quantity):
     for arguments in ({}, {"pga": quantity}, {"sa": quantity}, {"units": quantity}):
         try:

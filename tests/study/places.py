@@ -3,10 +3,12 @@
 import numpy as np
 
 from martths_jax import Motion
+from martths_jax.simulation import LANES
+from martths_jax.study.memory import lane_bytes
 
 SAMPLES = 600
-#: Memory [GB] that holds exactly one block (``LANES``) of such trials, so one device is used.
-ONE_BLOCK = 0.0015
+#: Memory [GB] that holds exactly one block of such trials, so one device is used.
+ONE_BLOCK = 1.2 * LANES * lane_bytes(SAMPLES, 1) / 1e9
 
 
 def short_motion(name: str = "one", phase: float = 0.0, factor: float = 1.0) -> Motion:
