@@ -5,7 +5,8 @@
     python benchmarks/compare.py cost --tables trials nb
     python benchmarks/compare.py --quick                 # small, to see that all of it works
 
-Programs run in processes of their own and take turns; times are medians.  Tables are printed and
+Programs run in processes of their own and take turns; times are medians, ratios the medians of
+those within a turn.  Tables are printed and
 written to benchmarks/results/ as Markdown and CSV.  Run it on a machine that does nothing else.
 """
 
@@ -55,7 +56,7 @@ class Sizes:
     trials: int = 1000
     samples: int | None = None  # None: the whole record
     slow_trials: int = 1000
-    rounds: int = 3
+    rounds: int = 5
     slow_rounds: int = 2
     cost_rounds: int = 3
     cost_trials: tuple = (1, 10, 100, 250, 500, 1000, 2000, 10000)
@@ -182,12 +183,19 @@ def compare_peers(folder: Path, sizes: Sizes, names, samples: int) -> list[dict]
         )
         say(f"{peer.name}: indices differ by {middle:.1e} (median), {worst:.1e} (worst); "
             f"{delays} delays differ")  # fmt: skip
-    rate = rows[0]["trial_samples_per_s"]
-    for row in rows:
-        row["engine_is_faster_by"] = rate / row["trial_samples_per_s"]
+    ready = next((peer for peer in peers if peer.name == "engine_ready"), None)
+    for row, peer in zip(rows, peers, strict=True):
+        row["engine_is_faster_by"] = faster(engine, peer)
+        row["ready_is_faster_by"] = faster(ready, peer) if ready else None
     for peer in peers:
         peer.close()
     return rows
+
+
+def faster(one: Process, other: Process) -> float:
+    """How many times the rate of another program one has: the median of the rounds' ratios."""
+    work = one.trials * one.samples / (other.trials * other.samples)
+    return median(b / a * work for a, b in zip(one.times, other.times, strict=False))
 
 
 def difference(theirs: np.ndarray, ours: np.ndarray) -> tuple[float, float, int]:

@@ -80,6 +80,7 @@ def peers_text(rows: list[dict]) -> str:
             "seconds": "time [s]",
             "trial_samples_per_s": "trial-samples/s",
             "engine_is_faster_by": "this engine is faster by",
+            "ready_is_faster_by": "with its noise ready",
             "compile_s": "compile [s]",
             "peak_MiB": "peak memory [MiB]",
             "median_difference": "index difference, median",

@@ -152,7 +152,7 @@ class Engine:
         for i, noise in enumerate(self.noise(trial)):
             which = np.arange(i * self.block, min((i + 1) * self.block, trial.size))
             sums, watch, _ = run_block(setup, plants, noise, which, self.devices, keep=False)
-            blocks.append(self._outcome(setup, sums, watch, trial[which]))
+            blocks.append(self.outcome(setup, sums, watch, trial[which]))
         return Outcome.join(blocks)
 
     def signals(self, controller: str, motion: str, trial: np.ndarray, device) -> dict:
@@ -169,7 +169,8 @@ class Engine:
         )
         return signals
 
-    def _outcome(self, setup: Setup, sums, watch, trial: np.ndarray) -> Outcome:
+    def outcome(self, setup: Setup, sums, watch, trial: np.ndarray) -> Outcome:
+        """What the sums and watch of a block with the given trials (T,) come to."""
         # As many trials in every block, so that the few operations here compile once.
         lanes = fill(np.arange(trial.size), self.block)
         sums, watch = jax.tree.map(lambda x: np.asarray(x)[..., lanes], (sums, watch))

@@ -68,7 +68,7 @@ def build_plan(config: StudyConfig) -> Plan:
             problems.append(str(error))
 
     benchmark = attempt(_benchmark, config)
-    motions = [attempt(_motion, name, config) for name in motion_names(config, attempt)]
+    motions = [attempt(study_motion, name, config) for name in motion_names(config, attempt)]
     controllers, settings = {}, {}
     problems += _unknown_tables(config)
     if benchmark is not None:
@@ -109,7 +109,8 @@ def motion_names(config: StudyConfig, attempt) -> tuple:
     return tuple(known or found)
 
 
-def _motion(given, config: StudyConfig) -> Motion:
+def study_motion(given, config: StudyConfig) -> Motion:
+    """A motion at the study's rate, from its name, its path or one that is loaded already."""
     if isinstance(given, Motion):
         if given.fs != config.fs:
             raise InputError(

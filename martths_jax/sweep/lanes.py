@@ -19,8 +19,7 @@ from martths_jax.sensors import unit_noise
 from martths_jax.simulation import LANES, Setup, fill, pick, reference_response, run_block
 from martths_jax.study.config import StudyConfig
 from martths_jax.study.engine import Engine, Outcome
-from martths_jax.study.plan import Plan, motion_names
-from martths_jax.study.plan import _motion as load_one
+from martths_jax.study.plan import Plan, motion_names, study_motion
 
 
 class NoiseStore:
@@ -87,7 +86,7 @@ class LaneEngine(Engine):
         )
         which = np.arange(cell.size)
         sums, watch, _ = run_block(setup, plants, noise, which, self.devices, keep=False)
-        return self._outcome(setup, sums, watch, np.asarray(plants.trial))
+        return self.outcome(setup, sums, watch, np.asarray(plants.trial))
 
 
 class Worlds:
@@ -138,4 +137,4 @@ def _scaled(given, config: StudyConfig, scale: float | None) -> Motion:
     if scale is not None and isinstance(given, Motion):
         factor = scale / given.scale
         return replace(given, acceleration=given.acceleration * factor, scale=scale)
-    return load_one(given, config if scale is None else replace(config, scale=scale))
+    return study_motion(given, config if scale is None else replace(config, scale=scale))
