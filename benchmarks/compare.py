@@ -72,7 +72,7 @@ QUICK = Sizes(128, 4096, 16, 2, 1, 1, (1, 64, 128), (2048, 4096), 64, (256,), (1
 class Process:
     """A peer in a process of its own."""
 
-    def __init__(self, name: str, folder: Path, trials: int, samples: int):
+    def __init__(self, name: str, folder: Path, trials: int, samples: int, env=None):
         given = json.dumps({"name": name, "trials": trials, "samples": samples})
         self.name, self.trials, self.samples, self.times = name, trials, samples, []
         self.process = subprocess.Popen(
@@ -81,7 +81,8 @@ class Process:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | {"MARTHS_CACHE": str(folder / "cache")},  # empty: it has to compile
+            # An empty cache: it has to compile.
+            env=os.environ | {"MARTHS_CACHE": str(folder / "cache")} | (env or {}),
         )
 
     def hear(self) -> dict | None:
@@ -113,14 +114,13 @@ def say(text: str) -> None:
     print(f"{time.strftime('%H:%M:%S')}  {text}", file=sys.stderr, flush=True)
 
 
-def worker(mode: str, folder: Path, given: dict, env: dict | None = None) -> dict:
+def worker(mode: str, folder: Path, given: dict) -> dict:
     """Last answer of a worker that runs through."""
     done = None
     with subprocess.Popen(
         [sys.executable, str(HERE / "worker.py"), mode, str(folder), json.dumps(given)],
         stdout=subprocess.PIPE,
         text=True,
-        env=os.environ | (env or {}),
     ) as process:
         for line in process.stdout:
             if line.startswith("{"):
@@ -234,25 +234,47 @@ def cost_cases(sizes: Sizes, samples: int, tables) -> list[dict]:
 def measure_cost(folder: Path, sizes: Sizes, samples: int, tables) -> list[dict]:
     """Rows of all cost tables."""
     cases, rows = cost_cases(sizes, samples, tables), []
-    jobs = [(cases, {})] if cases else []
+    if cases:
+        told = worker("cost", folder, {"cases": cases, "rounds": sizes.cost_rounds})
+        for case, times in zip(cases, told["times"], strict=True):
+            rows.append(cost_row(case, told["devices"], times))
     if "devices" in tables:
-        case = {"table": "devices", "controller": "adfc", "nb": 1024, "samples": samples}
-        case["trials"] = sizes.trials
-        jobs += [([case | {"value": n}], {"MARTHS_DEVICES": str(n)}) for n in sizes.cost_devices]
-    for group, env in jobs:
-        told = worker("cost", folder, {"cases": group, "rounds": sizes.cost_rounds}, env)
-        for case, times in zip(group, told["times"], strict=True):
-            rows.append(
-                {name: case[name] for name in ("table", "value", "controller", "nb", "trials",
-                                               "samples")}
-                | {
-                    "devices": told["devices"],
-                    "seconds": median(times),
-                    "runs": len(times),
-                    "trial_samples_per_s": case["trials"] * case["samples"] / median(times),
-                }
-            )  # fmt: skip
+        rows += compare_devices(folder, sizes, samples)
     return rows
+
+
+def compare_devices(folder: Path, sizes: Sizes, samples: int) -> list[dict]:
+    """Rows of one engine a number of devices; they take turns."""
+    engines = [
+        Process("engine", folder, sizes.trials, samples, {"MARTHS_DEVICES": str(n)})
+        for n in sizes.cost_devices
+    ]
+    for engine in engines:
+        engine.hear()
+        engine.ask("run")
+    for _ in range(sizes.rounds):
+        for engine in engines:
+            engine.times.append(engine.ask("run")["seconds"])
+            say(f"devices: {engine.times[-1]:.2f} s")
+    case = {"table": "devices", "controller": "adfc", "nb": 1024, "samples": samples}
+    rows = []
+    for n, engine in zip(sizes.cost_devices, engines, strict=True):
+        row = cost_row(case | {"value": n, "trials": sizes.trials}, n, engine.times)
+        rows.append(row | {"relative": faster(engine, engines[0])})
+        engine.close()
+    return rows
+
+
+def cost_row(case: dict, devices: int, times: list[float]) -> dict:
+    """One row of a cost table."""
+    names = ("table", "value", "controller", "nb", "trials", "samples")
+    return {name: case[name] for name in names} | {
+        "devices": devices,
+        "seconds": median(times),
+        "runs": len(times),
+        "trial_samples_per_s": case["trials"] * case["samples"] / median(times),
+        "relative": None,
+    }
 
 
 def arguments() -> argparse.Namespace:

@@ -101,7 +101,8 @@ def cost_text(rows: list[dict]) -> str:
         base = next((r for r in group if (name, r["value"]) in {("trials", 1000), ("devices", 1)}),
                     group[-1])  # fmt: skip
         for row in group:
-            row["relative"] = row["trial_samples_per_s"] / base["trial_samples_per_s"]
+            if row["relative"] is None:  # not compared within a turn
+                row["relative"] = row["trial_samples_per_s"] / base["trial_samples_per_s"]
         columns = {
             "value": name,
             "trials": "trials in all",

@@ -23,6 +23,8 @@ from martths_jax.structure.modal import ModalSystem, advance, contract, output
 
 #: Length of the time loop's windows for controllers that keep none [samples].
 WINDOW = 1024
+#: A window is gone through in pieces of at most so many samples, whose strokes stay in the cache.
+PIECE = 256
 
 
 @jax.tree_util.register_dataclass
@@ -143,8 +145,9 @@ def run(
 ) -> tuple[IndexSums, watching.Watch, dict[str, jax.Array], Any]:
     """Run a batch of trials over a whole motion.
 
-    The scan over time is nested: windows of the controller's buffer length outside, samples
-    inside.  The rows that a window writes are what the next one hands back as ``delayed``.
+    The scan over time is nested: windows of the controller's buffer length outside, in them pieces
+    that are cross-correlated, in these samples.  The rows that a window writes are what the next
+    one hands back as ``delayed``.
 
     Args:
         benchmark, controller: what stays; the controller is prepared.
@@ -169,6 +172,7 @@ def run(
     rows = ground.shape[0]
     N = rows if samples is None else samples
     length = controller.window or WINDOW
+    part = segment or piece_length(length)
     windows = -(-rows // length)
 
     def in_windows(x):
@@ -197,14 +201,11 @@ def run(
     def window(carry, inputs):
         records, carry = carry
         inputs = (*inputs, records)
-        if segment:
-            cut = lambda x: x.reshape(length // segment, segment, *x.shape[1:])  # noqa: E731
-            join = lambda x: x.reshape(length, *x.shape[2:])  # noqa: E731
-            body = jax.checkpoint(piece, prevent_cse=False)
-            carry, outputs = jax.lax.scan(body, carry, jax.tree.map(cut, inputs))
-            records, signals = jax.tree.map(join, outputs)
-        else:
-            carry, (records, signals) = piece(carry, inputs)
+        cut = lambda x: x.reshape(length // part, part, *x.shape[1:])  # noqa: E731
+        join = lambda x: x.reshape(length, *x.shape[2:])  # noqa: E731
+        body = jax.checkpoint(piece, prevent_cse=False) if segment else piece
+        carry, outputs = jax.lax.scan(body, carry, jax.tree.map(cut, inputs))
+        records, signals = jax.tree.map(join, outputs)
         (state, *rest), *correlations = carry
         state = replace(state, controller=controller.turn(state.controller))
         return (records, ((state, *rest), *correlations)), signals
@@ -251,6 +252,12 @@ def run(
         fs=benchmark.fs,
     )
     return index_sums, watch, signals, extra
+
+
+def piece_length(window: int) -> int:
+    """Largest divisor of a window up to ``PIECE``; the whole window where all are small."""
+    longest = next(n for n in range(min(PIECE, window), 0, -1) if window % n == 0)
+    return longest if longest >= PIECE // 8 else window
 
 
 def _book(booked, signals, reference, k, valid, tally):
