@@ -5,7 +5,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from martths_jax import ADFC, Passthrough, build_coupler, draw_plants, indices, simulate, simulation
+from martths_jax import (
+    ADFC,
+    Passthrough,
+    build_coupler,
+    draw_plants,
+    indices,
+    loop,
+    simulate,
+    simulation,
+)
 from martths_jax.controllers import least_squares as ls
 from martths_jax.controllers.adfc import BACKWARD_DIFFERENCES, TAPS, regress
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
@@ -132,6 +141,28 @@ def test_difference_recurrences_give_the_backward_differences():
         taps = samples[k - TAPS + 1 : k + 1][::-1]
         expected = np.einsum("dn,nat->adt", BACKWARD_DIFFERENCES, taps).reshape(8, 3)
         np.testing.assert_allclose(np.stack(phi), expected, rtol=0, atol=1e-13)
+
+
+def test_pieces_divide_a_window():
+    for window, piece in ((1024, 256), (1000, 250), (4096, 256), (200, 200), (9, 9), (641, 641)):
+        assert loop.piece_length(window) == piece
+    assert loop.piece_length(2 * 641) == 2 * 641  # pieces of two samples would cost more
+
+
+def test_pieces_of_a_window_change_only_round_off(benchmark, monkeypatch):
+    """Three pieces a window, and whole windows, with delays found across their ends."""
+    plants, controller = draw_plants(3, 4), ADFC(nb=192, no=191)
+
+    def outcome(piece):
+        monkeypatch.setattr(loop, "PIECE", piece)
+        simulation.compiled.cache_clear()
+        sums = simulate(benchmark, controller, plants, MOTION).sums
+        return [np.asarray(x) for x in (sums.correlation, sums.error_square, sums.error_peak)]
+
+    whole, pieces = outcome(192), outcome(64)
+    simulation.compiled.cache_clear()
+    for a, b in zip(whole, pieces, strict=True):
+        np.testing.assert_allclose(b, a, rtol=1e-11)
 
 
 @pytest.mark.parametrize("n", [16, 100, 7])
