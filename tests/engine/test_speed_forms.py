@@ -58,12 +58,14 @@ def test_ldl_and_lu_solve_the_same_systems():
         np.testing.assert_allclose(tolerance, shares.min(1), rtol=1e-6)
 
 
-def test_both_solvers_say_when_a_matrix_is_singular():
-    G, h = np.eye(8)[None].repeat(2, 0), np.ones((2, 8, 2))
+def test_both_solvers_say_when_a_matrix_is_singular_or_indefinite():
+    """Round-off can make a normal matrix indefinite, which a large pivot alone would not show."""
+    G, h = np.eye(8)[None].repeat(3, 0), np.ones((3, 8, 2))
     G[1, 3] = G[1, :, 3] = 0.0
+    G[2, 3, 4] = G[2, 4, 3] = 2.0
     for solver in ls.SOLVERS.values():
         tolerance = np.asarray(jax.jit(solver)(packed(G, h))[1])
-        assert tolerance[0] == 1.0 and not tolerance[1] > 0
+        assert tolerance[0] == 1.0 and not np.any(tolerance[1:] > 0)
 
 
 def test_a_run_with_ldl_meets_one_with_lu(benchmark, batch):
