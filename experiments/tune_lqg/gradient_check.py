@@ -1,12 +1,11 @@
 """Gradient of a whole run on the full El Centro: three ways to it, its memory and its cost.
 
-    XLA_FLAGS=--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1024 \
-        python experiments/tune_lqg/gradient_check.py lqg --records DIR
+    python experiments/tune_lqg/gradient_check.py lqg --records DIR
+    python experiments/tune_lqg/gradient_check.py adfc --records DIR
 
 Reverse mode with segmented checkpointing against central finite differences and forward mode, for
 every number that can be tuned.  Cost is told relative to the objective's own run without a
-gradient, in the same process, the best of three.  Writes results/gradient_NAME.json.  For adfc
-leave the flag away; reverse mode is skipped, which takes very long to compile (docs/tuning.md).
+gradient, in the same process, the best of three.  Writes results/gradient_NAME.json.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from martths_jax.runtime import compiler_options
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import draw_noise, reference_response
 from martths_jax.tune import Objective
-from martths_jax.tune.gradient import FORWARD, segment_length
+from martths_jax.tune.gradient import segment_length
 from martths_jax.tune.parameters import build, start_of
 
 STEP = 1e-4  # of the finite differences [decades]
@@ -59,10 +58,11 @@ def main() -> None:
     report = {"controller": kind, "samples": int(ground.size), "plants": chosen.plants}
     run, report["run"] = compiled(value, x, *inputs)
     by_forward, report["forward mode, all numbers"] = compiled(forward, x, *inputs)
-    slopes = {"forward mode": np.asarray(by_forward(x, *inputs))}
-    if kind not in FORWARD:
-        by_reverse, report["reverse mode, all numbers"] = compiled(reverse, x, *inputs)
-        slopes["reverse mode"] = np.asarray(by_reverse(x, *inputs)[1])
+    by_reverse, report["reverse mode, all numbers"] = compiled(reverse, x, *inputs)
+    slopes = {
+        "forward mode": np.asarray(by_forward(x, *inputs)),
+        "reverse mode": np.asarray(by_reverse(x, *inputs)[1]),
+    }
     for mode in slopes:
         cost = report[f"{mode}, all numbers"]["seconds"] / report["run"]["seconds"]
         report[f"{mode}, cost in runs"] = round(cost, 2)

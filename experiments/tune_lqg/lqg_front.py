@@ -1,13 +1,11 @@
 """LQG's weights along the trade-off of J5 against J8, by gradients through the strong motion.
 
-    XLA_FLAGS=--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1024 \
-        python experiments/tune_lqg/lqg_front.py --records DIR
+    python experiments/tune_lqg/lqg_front.py --records DIR
 
 For each w the six weights minimise w J5 + (1 - w) J8 on uncertain plants and the first 16 s of El
 Centro, each w from where the one before ended.  The gradient is that of ``martths tune``, the
 descent L-BFGS: the weights lie in a narrow valley, which its curvature follows in fewer runs than
-Adam's steps.  Writes results/lqg_front.csv (log10 of the weights).  The XLA flag only saves
-time in compiling.
+Adam's steps.  Writes results/lqg_front.csv (log10 of the weights).
 """
 
 from __future__ import annotations

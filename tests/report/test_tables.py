@@ -94,9 +94,7 @@ def test_replay_gives_the_study_s_bits_and_keeps_the_signals(tmp_path):
 def test_a_tuning_beside_the_study(study_folder, tmp_path):
     tuned = tmp_path / "tuned"
     tuned.mkdir()
-    (tuned / "design.json").write_text(
-        '{"controller": "lqg", "ended": "done", "e1": 3.5}'
-    )
+    (tuned / "design.json").write_text('{"controller": "lqg", "ended": "done", "e1": 3.5}')
     (tuned / "comparison.csv").write_text("index,start,tuned\nJ2_1,5.25,4.125\n")
     matplotlib.image.imsave(tuned / "convergence.png", np.zeros((4, 4)))
     (tuned / "large.png").write_bytes(bytes(5_000_000))
