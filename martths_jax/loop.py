@@ -122,7 +122,16 @@ def sample_period(
 
 @once
 def restoring_force(taps, interface, before):
-    """Force (3, T) of the experimental frame from its motion at k, k-1 and k-2 (2, T) each."""
+    """Force of the experimental frame.
+
+    Args:
+        taps: (3, 3, 2) on the motion at k, k-1 and k-2.
+        interface: (2, T) motion at k [m, rad].
+        before: (2, 2, T) motion at k-1 and k-2.
+
+    Returns:
+        (3, T) force on floor-1 x [N], moments on nodes 4 and 7 [N m].
+    """
     force = contract(taps[0], interface)
     force = contract(taps[1], before[0], start=force)
     return contract(taps[2], before[1], start=force)
