@@ -6,8 +6,8 @@
     python benchmarks/compare.py --quick                 # small, to see that all of it works
 
 Programs run in processes of their own and take turns; times are medians, ratios the medians of
-those within a turn.  Tables are printed and
-written to benchmarks/results/ as Markdown and CSV.  Run it on a machine that does nothing else.
+those within a turn.  Tables are printed and written to benchmarks/results/ as Markdown and CSV.
+Run it on a machine that does nothing else.
 """
 
 from __future__ import annotations
@@ -155,11 +155,7 @@ def compare_peers(folder: Path, sizes: Sizes, names, samples: int) -> list[dict]
     """Rows of the table of programs."""
     peers = start_peers(["engine", *(n for n in names if n != "engine")], folder, sizes, samples)
     engine = peers[0]
-    for turn in range(sizes.rounds):
-        for peer in peers:
-            if turn < (sizes.slow_rounds if PROGRAMS[peer.name][1] else sizes.rounds):
-                peer.times.append(peer.ask("run")["seconds"])
-                say(f"{peer.name}: {peer.times[-1]:.2f} s")
+    take_turns(peers, sizes)
     rows = []
     for peer in peers:
         seconds = median(peer.times)
@@ -190,6 +186,15 @@ def compare_peers(folder: Path, sizes: Sizes, names, samples: int) -> list[dict]
     for peer in peers:
         peer.close()
     return rows
+
+
+def take_turns(peers: list[Process], sizes: Sizes) -> None:
+    """Time the programs, one run of each after the other, the slow ones less often."""
+    for turn in range(sizes.rounds):
+        for peer in peers:
+            if turn < (sizes.slow_rounds if PROGRAMS[peer.name][1] else sizes.rounds):
+                peer.times.append(peer.ask("run")["seconds"])
+                say(f"{peer.name}: {peer.times[-1]:.2f} s")
 
 
 def faster(one: Process, other: Process) -> float:
@@ -252,10 +257,7 @@ def compare_devices(folder: Path, sizes: Sizes, samples: int) -> list[dict]:
     for engine in engines:
         engine.hear()
         engine.ask("run")
-    for _ in range(sizes.rounds):
-        for engine in engines:
-            engine.times.append(engine.ask("run")["seconds"])
-            say(f"devices: {engine.times[-1]:.2f} s")
+    take_turns(engines, sizes)
     case = {"table": "devices", "controller": "adfc", "nb": 1024, "samples": samples}
     rows = []
     for n, engine in zip(sizes.cost_devices, engines, strict=True):

@@ -93,9 +93,9 @@ def slide(rows, nb, turn):
     def one(sums, pair):
         whole, new = sums
         entering, leaving = pair
-        both = (entering[:8], entering[8:]), (leaving[:8], leaving[8:])
-        whole = ls.exchange_observation(whole, *both[0], *both[1])
-        return (whole, ls.add_observation(new, *both[0])), None
+        added, taken = ((row[:8], row[8:]) for row in (entering, leaving))
+        whole = ls.exchange_observation(whole, *added, *taken)
+        return (whole, ls.add_observation(new, *added)), None
 
     window = jax.jit(lambda sums, pairs: jax.lax.scan(one, sums, pairs)[0])
     sums = (ls.zeros(8, 2, 3),) * 2
