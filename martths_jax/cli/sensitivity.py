@@ -11,6 +11,7 @@ from rich.markup import escape
 from martths_jax.cli.console import console
 from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
 from martths_jax.cli.run_options import (
+    AllowMixed,
     Config,
     Controllers,
     Devices,
@@ -66,6 +67,7 @@ def sensitivity(
     figures: Figures = True,
     devices: Devices = None,
     memory_gb: Memory = None,
+    allow_mixed: AllowMixed = False,
     quiet: Quiet = False,
 ) -> None:
     """What drives each index: Sobol' indices of plant parameters, noise and motion."""
@@ -83,6 +85,7 @@ def sensitivity(
             reporter=reporter_for(quiet),
             fresh=fresh,
             figures=figures,
+            allow_mixed=allow_mixed,
             command_line=command_line(),
         )
     except KeyboardInterrupt:

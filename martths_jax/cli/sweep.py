@@ -11,6 +11,7 @@ from rich.markup import escape
 from martths_jax.cli.console import console
 from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
 from martths_jax.cli.run_options import (
+    AllowMixed,
     Config,
     Controllers,
     Devices,
@@ -86,6 +87,7 @@ def sweep(
     figures: Figures = True,
     devices: Devices = None,
     memory_gb: Memory = None,
+    allow_mixed: AllowMixed = False,
     quiet: Quiet = False,
 ) -> None:
     """Repeat a study on a grid of parameters, the same plants and noise in every cell."""
@@ -108,7 +110,7 @@ def sweep(
     try:
         done = run_sweep(
             chosen, reporter=reporter_for(quiet), fresh=fresh, figures=figures,
-            command_line=command_line(),
+            allow_mixed=allow_mixed, command_line=command_line(),
         )  # fmt: skip
     except KeyboardInterrupt:
         say_what_is_kept(chosen.study.out)

@@ -66,7 +66,7 @@ def tune(
         raise InputError(f"Option --fresh-plants must be at least 1, but got {fresh}.")
     *tuned_on, unseen = load_all([*motions, check], records, scale)
     benchmark = build_benchmark()
-    state = run_tuning(benchmark, options, tuned_on, out, tell=_tell)
+    state = run_tuning(benchmark, options, tuned_on, out, tell=_tell, notice=_notice)
     rows = write_report(benchmark, controller, state, unseen, fresh, out)
     console.print(_table(rows, controller, unseen.name, fresh))
     console.print(f"{state['ended'] or 'All steps done'}; results in {out}", soft_wrap=True)
@@ -88,6 +88,10 @@ def _tell(row: dict) -> None:
     shown = [f"{n} {v:.3f}" for n, v in row.items() if n not in skip and not n.startswith("log10_")]
     line = f"step {row['step']}: objective {row['objective']:.4f}; {', '.join(shown)}"
     error_console.print(line if row["accepted"] else f"{line} (unstable: backed off)")
+
+
+def _notice(text: str) -> None:
+    error_console.print(text, highlight=False, markup=False, soft_wrap=True)
 
 
 def _table(rows: list[dict], controller: str, motion: str, plants: int) -> Table:

@@ -7,7 +7,6 @@ import hashlib
 import inspect
 from dataclasses import dataclass
 
-import jax
 import numpy as np
 
 from martths_jax.benchmark import Benchmark, build_benchmark
@@ -18,6 +17,7 @@ from martths_jax.motions.catalogue import BENCHMARK_NAMES, record_files
 from martths_jax.sensors import SensorNoise
 from martths_jax.study.config import StudyConfig, unknown_names
 from martths_jax.study.draws import Draws, make_draws
+from martths_jax.study.sources import code_of, without_source
 
 #: Kinds of controllers a configuration can name, and what makes them from their settings.
 KINDS = {"lqg": LQG.design, "adfc": ADFC, "passthrough": Passthrough}
@@ -51,6 +51,20 @@ class Plan:
     def trials(self) -> int:
         """Number of uncertain plants; trial 0, the nominal plant, comes on top."""
         return self.draws.trials
+
+    @property
+    def notices(self) -> list[str]:
+        """Sentences a user should read before it runs."""
+        found = [text for motion in self.motions for text in motion.notices]
+        for name, settings in self.controller_settings.items():
+            unknown = without_source(settings.get("code", {}))
+            if unknown:
+                found.append(
+                    f"Controller {name!r}: the source of {', '.join(unknown)} cannot be found, so "
+                    "these results can be neither resumed nor extended nor merged; define it with "
+                    "`def` in a file to have that."
+                )
+        return found
 
 
 def build_plan(config: StudyConfig) -> Plan:
@@ -152,7 +166,7 @@ def build_controller(given, config: StudyConfig, benchmark: Benchmark) -> tuple[
         InputError: an unknown kind or setting, or a value the controller refuses.
     """
     if isinstance(given, Controller):
-        return given, {"kind": type(given).__name__, "sha256": _fingerprint(given)}
+        return given, {"kind": type(given).__name__, "code": code_of(given)}
     table = dict(config.controller.get(given, {}))
     kind = table.pop("kind", given)
     if kind not in KINDS:
@@ -181,15 +195,6 @@ def _named(controller: Controller, name: str) -> Controller:
     # The name is a class attribute, not a field, so that it stays out of the compiled program.
     object.__setattr__(controller, "name", name)
     return controller
-
-
-def _fingerprint(controller: Controller) -> str:
-    leaves, tree = jax.tree.flatten(controller)
-    digest = hashlib.sha256(str(tree).encode())
-    for leaf in leaves:
-        array = np.asarray(leaf)
-        digest.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
-    return digest.hexdigest()
 
 
 def motion_identity(motion: Motion) -> dict:
