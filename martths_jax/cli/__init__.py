@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 from typing import Annotated
 
@@ -61,5 +63,7 @@ def main() -> None:
         error_console.print(text, highlight=False, soft_wrap=True)
         sys.exit(2)
     except KeyboardInterrupt:
+        # A second one, while Python and JAX clean up, ends the process at once and without a word.
+        signal.signal(signal.SIGINT, lambda *_: os._exit(130))
         error_console.print("Interrupted; no half-written file was left.")
         sys.exit(130)

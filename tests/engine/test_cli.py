@@ -2,13 +2,15 @@
 
 import csv
 import json
+import os
+import signal
 import sys
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from martths_jax import published
+from martths_jax import cli, published
 from martths_jax.cli import app, main
 from martths_jax.files import atomic
 from martths_jax.nominal import Comparison, compare_with_table4
@@ -109,3 +111,20 @@ def test_comparison_averages_over_motions():
     each = {"adfc": {"a": dict.fromkeys(published.TABLE4, 1.0)}}
     table = Comparison(("a",), {"adfc": each["adfc"]["a"]}, each).to_markdown()
     assert "| J2_1 | 1.00 | 3.9 | -74.4 % |" in table
+
+
+def test_ctrl_c_twice_ends_at_once(monkeypatch):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    ended = []
+    monkeypatch.setattr(cli, "app", interrupted)
+    monkeypatch.setattr(os, "_exit", ended.append)
+    handler = signal.getsignal(signal.SIGINT)
+    try:
+        with pytest.raises(SystemExit) as first:
+            cli.main()
+        os.kill(os.getpid(), signal.SIGINT)
+        assert (first.value.code, ended) == (130, [130])
+    finally:
+        signal.signal(signal.SIGINT, handler)
