@@ -206,6 +206,8 @@ def read_dataset(path: Path, group: str | None = None) -> xr.Dataset:
             "wrote it."
         )
     written = dataset.attrs.pop(CHECKSUM, None)
+    if written is None:
+        raise _damaged(path, "it has no checksum, or an earlier version wrote it")
     if written != content_digest(dataset):
         raise _damaged(path, "its content is not what its checksum says")
     return dataset
