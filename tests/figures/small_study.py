@@ -42,6 +42,7 @@ def build(parent: Path) -> Path:
     for i, (controller, motion) in enumerate(run.cells):
         run.write(controller, motion, trials, outcome(i))
     dataset = write_results(run)
+    run.close()
     path = run.path / "signals.nc"
     write_dataset(xr.Dataset(attrs={"format": FORMAT, "label": "-"}), path)
     for motion in MOTIONS:
