@@ -98,10 +98,10 @@ def test_bands_do_not_depend_on_the_blocks(study_folder, monkeypatch):
     hz = np.asarray(open_study(study_folder).dataset.plant_hz.values)
     whole = [*plants._magnitude_and_phase(hz, plants._percentiles)]
     whole.append(plants._plant_delay(hz, 1024.0, plants._percentiles))
-    monkeypatch.setattr(plants, "BLOCK", 4 * 8 * len(hz))
+    monkeypatch.setattr(plants, "BLOCK", 4 * 2 * len(hz))
     parts = [*plants._magnitude_and_phase(hz, plants._percentiles)]
     parts.append(plants._plant_delay(hz, 1024.0, plants._percentiles))
-    assert np.ptp(whole[1][0, :, 0, 0]) > 180
+    assert whole[1].min() < -185  # degrees, from the last three frequencies on
     for a, b in zip(whole, parts, strict=True):
         np.testing.assert_allclose(b, a, rtol=1e-12, atol=1e-12)
 
