@@ -14,6 +14,7 @@ from martths_jax.report import write_report
 from martths_jax.study import open_study
 from tests.figures.small_study import LOST, MOTIONS, TRIALS
 from tests.report.chromium import Page, find_chromium
+from tests.tools import missing
 
 RUNS = 2 * len(MOTIONS) * (TRIALS + 1)
 PAGE = 50
@@ -33,7 +34,7 @@ def report(study_folder, tmp_path_factory) -> Path:
 def page(report, tmp_path_factory):
     executable = find_chromium()
     if executable is None:
-        pytest.skip("no Chromium was found; install one or set MARTHS_CHROMIUM to its path")
+        missing("no Chromium was found", "install one or set MARTHS_CHROMIUM to its path")
     page = Page(executable, tmp_path_factory.mktemp("profile"))
     page.resize(1400, 900)
     page.open(report, READY)
