@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import re
 import sys
+import warnings
 from functools import lru_cache
 from pathlib import Path
 
 import jax
+
+from martths_jax.xla_flags import flag_is_known
 
 
 def _backend_is_up() -> bool:
@@ -16,11 +19,13 @@ def _backend_is_up() -> bool:
     return bool(bridge is not None and bridge.backends_are_initialized())
 
 
-#: Back-end options (XLA ignores those it does not know), which act on the whole process.  The first
+#: Back-end options, which act on the whole process; XLA ignores those it does not know, as long as
+#: their names begin with "xla_" (it hands others to LLVM, which ends the process).  The first
 #: compiles a time loop into one kernel instead of a list of some hundred kernels that are started
 #: one by one, each for half a microsecond: three times faster here.  The second leaves loops over
 #: the trials as loops of vector operations; LLVM would write many of them out trial by trial
 #: before it looks for vectors, which costs a third more time to compile and some to run.
+EXTRA = "xla_backend_extra_options"
 XLA_EXTRA_OPTIONS = (
     "xla_cpu_small_while_loop_byte_threshold=1000000000000,xla_cpu_disable_loop_unrolling"
 )
@@ -32,11 +37,16 @@ COMPILER_OPTIONS = {
     "xla_cpu_experimental_ynn_fusion_type": "",
     "xla_cpu_use_fusion_emitters": False,
 }
+#: What it costs to go without an option.
+SLOWER = "simulations take longer, up to three times, and their results agree to rounding"
 
 
 @lru_cache(maxsize=1)
 def compiler_options() -> dict[str, object]:
-    """Those of ``COMPILER_OPTIONS`` that this JAX knows, for ``jax.jit``; none off the CPU."""
+    """Those of ``COMPILER_OPTIONS`` that this JAX knows, for ``jax.jit``; none off the CPU.
+
+    Warns, once a process, of those it does not know.
+    """
     if jax.default_backend() != "cpu":
         return {}
     known = {}
@@ -46,6 +56,8 @@ def compiler_options() -> dict[str, object]:
         except jax.errors.JaxRuntimeError:
             continue
         known[name] = value
+    if unknown := ", ".join(name for name in COMPILER_OPTIONS if name not in known):
+        warnings.warn(f"JAX {jax.__version__} does not know {unknown}; {SLOWER}.", stacklevel=2)
     return known
 
 
@@ -105,9 +117,12 @@ def configure() -> None:
     if _backend_is_up():
         return
     flags = os.environ.get("XLA_FLAGS", "")
-    if "xla_backend_extra_options" not in flags:
-        flags = f"{flags} --xla_backend_extra_options={XLA_EXTRA_OPTIONS}".strip()
-        os.environ["XLA_FLAGS"] = flags
+    if EXTRA not in flags:
+        if flag_is_known(EXTRA):
+            flags = f"{flags} --{EXTRA}={XLA_EXTRA_OPTIONS}".strip()
+            os.environ["XLA_FLAGS"] = flags
+        else:
+            warnings.warn(f"JAX {jax.__version__} does not know {EXTRA}; {SLOWER}.", stacklevel=2)
     chosen = re.search(r"xla_force_host_platform_device_count", flags)
     if not chosen and "JAX_NUM_CPU_DEVICES" not in os.environ:
         devices = int(os.environ.get("MARTHS_DEVICES") or usable_cores())
