@@ -1,7 +1,8 @@
 """The result file: one NetCDF-4 file that xarray, MATLAB's ``ncread`` and plain HDF5 tools read.
 
 Text is stored as fixed-length characters and attributes as fixed-length text, since older readers
-know neither variable-length strings nor booleans.  Nothing in the file depends on when, in how many
+know neither variable-length strings nor booleans; both are marked as UTF-8, so that whoever knows
+the mark (xarray, netCDF4) gives text and not bytes.  Nothing in the file depends on when, in how many
 sessions or on how many devices it was computed: that is in ``provenance.json``.
 """
 
@@ -10,6 +11,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 import xarray as xr
 
@@ -28,6 +30,8 @@ STATUS_FLAGS = {
     "flag_values": np.array([int(s) for s in Status], dtype=np.int32),
     "flag_meanings": " ".join(s.name.lower() for s in Status),
 }
+#: What says that characters are text, by the conventions of NetCDF.
+ENCODING = {"_Encoding": "utf-8"}
 #: Longest attribute HDF5 stores in an object's header [bytes].
 LONGEST_ATTRIBUTE = 60_000
 _FIRST_WORDS = {
@@ -136,12 +140,12 @@ def write_dataset(dataset: xr.Dataset, path: Path, group: str | None = None) -> 
     """Write a dataset into a file that is not yet in its place (see ``files.writing``)."""
     stored = dataset.copy()
     for name, variable in stored.variables.items():
+        attrs = variable.attrs
         if variable.dtype.kind == "U":
-            variable = xr.Variable(
-                variable.dims, np.char.encode(variable.values, "utf-8"), variable.attrs
-            )
+            text = np.char.encode(variable.values, "utf-8")
+            variable, attrs = xr.Variable(variable.dims, text), attrs | ENCODING
         variable = variable.copy()
-        variable.attrs = {k: _fixed(v) for k, v in variable.attrs.items()}
+        variable.attrs = {k: _fixed(v) for k, v in attrs.items()}
         stored[name] = variable
     stored.attrs = {k: _fixed(v) for k, v in stored.attrs.items()}
     # No fill value beside NaN itself: nothing is missing, and a NaN is a trial that diverged.
@@ -151,7 +155,10 @@ def write_dataset(dataset: xr.Dataset, path: Path, group: str | None = None) -> 
 
 
 def _fixed(value):
-    return np.bytes_(value.encode()) if isinstance(value, str) else value
+    if not isinstance(value, str):
+        return value
+    content = value.encode()
+    return np.array(content, dtype=h5py.string_dtype("utf-8", max(len(content), 1)))
 
 
 def save_dataset(dataset: xr.Dataset, path: Path) -> None:
@@ -187,13 +194,11 @@ def read_dataset(path: Path, group: str | None = None) -> xr.Dataset:
             dataset = file.load()
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{path} cannot be read as a study's results ({error}).") from None
-    dataset.attrs = {k: v.decode() if isinstance(v, bytes) else v for k, v in dataset.attrs.items()}
     for name, variable in dataset.variables.items():
-        variable.attrs = {
-            k: v.decode() if isinstance(v, bytes) else v for k, v in variable.attrs.items()
-        }
-        if variable.dtype.kind == "S":
-            text = np.char.decode(variable.values, "utf-8")
+        # Characters come as text, and as bytes from files that do not say their encoding.
+        if variable.dtype.kind in "SO":
+            text = variable.values
+            text = np.char.decode(text, "utf-8") if text.dtype.kind == "S" else text.astype(str)
             dataset[name] = (variable.dims, text, variable.attrs)
     found = dataset.attrs.get("format", FORMAT if group else None)
     if found is None or int(np.ravel(found)[0]) != FORMAT:
