@@ -16,6 +16,7 @@ from martths_jax.motions import MotionInfo, available_motions, load_record, writ
 from martths_jax.motions.figure import draw_motion
 from martths_jax.motions.overview import FIRST_MODE
 from martths_jax.motions.units import G
+from martths_jax.text import counted
 
 app = typer.Typer(help="List, show and make ground motions.")
 console = Console()
@@ -91,7 +92,7 @@ def make(
         )
     accepted = sum(line["accepted"] for line in lines)
     console.print(
-        f"Wrote {len(lines)} motions to {escape(str(out))}; {accepted} of them are within the "
+        f"Wrote {counted(len(lines), 'motion')} to {escape(str(out))}; {accepted} within the "
         "limits on spectrum, PGA, Arias intensity and D5-95 (see ensemble.json).",
         soft_wrap=True,
     )

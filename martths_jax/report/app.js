@@ -209,10 +209,14 @@
     byId("plot-note").textContent =
       `${current.controller} on ${current.motion}, trial ${current.trial} (${current.role}). ` +
       `Drag to zoom all panels, double-click for the whole record. Strokes, errors and forces: ` +
-      `every ${ordinal(current.signals[0].stride)} sample is in this file.`;
+      `${every(current.signals[0].stride)} sample is in this file.`;
   }
 
-  const ordinal = (n) => (n === 1 ? "" : `${n}th`);
+  // "every sample", "every 2nd sample", "every 11th sample"
+  const every = (n) => {
+    const ending = Math.floor(n / 10) % 10 === 1 ? "th" : ["th", "st", "nd", "rd"][n % 10] ?? "th";
+    return n === 1 ? "every" : `every ${n}${ending}`;
+  };
 
   // New detail for the window in view.
   function refine() {

@@ -23,6 +23,7 @@ from martths_jax.study.progress import Reporter, Tally, compile_seconds
 from martths_jax.study.runner import Session, header, tell_notices
 from martths_jax.sweep.config import SHOWN
 from martths_jax.sweep.lanes import LaneEngine
+from martths_jax.text import counted
 from martths_jax.watch import Status
 
 #: What an analysis has where a study has another default.
@@ -126,8 +127,8 @@ def make_engine(plan: Plan, design: Design, reporter: Reporter) -> LaneEngine:
     d = len(design.factors)
     reporter.notice(
         f"Seed {plan.config.seed}; N = {design.samples} base samples x (d + 2) = {d + 2} rows = "
-        f"{design.rows} runs of each of {len(plan.controllers)} controller(s) on {count} "
-        f"{devices[0].platform} device(s), about "
+        f"{design.rows} runs of {counted(len(plan.controllers), 'controller')} each on "
+        f"{counted(count, f'{devices[0].platform} device')}, about "
         f"{2 * chunk * lane_bytes(samples, plan.noise.channels) / GB:.2g} GB."
     )
     tell_notices(plan.motions, reporter)

@@ -1,8 +1,8 @@
 """The result file: one NetCDF-4 file that xarray, MATLAB's ``ncread`` and plain HDF5 tools read.
 
 Text is stored as fixed-length characters and attributes as fixed-length text, since older readers
-know neither variable-length strings nor booleans; both are marked as UTF-8, so that whoever knows
-the mark (xarray, netCDF4) gives text and not bytes.  Nothing in the file depends on when, in how many
+know neither variable-length strings nor booleans.  Both are marked as UTF-8: whoever knows the mark
+(xarray, netCDF4) gives text and not bytes.  Nothing in the file depends on when, in how many
 sessions or on how many devices it was computed: that is in ``provenance.json``.
 """
 

@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from martths_jax.text import counted
+
 _COMPILE_PREFIX = "/jax/core/compile/"
 _compile_seconds = 0.0
 
@@ -103,7 +105,7 @@ class Lines(Reporter):
             return
         self.last[cell] = now
         self.notice(
-            f"{cell[0]} on {cell[1]}: {tally.done} of {tally.total} trials, "
+            f"{cell[0]} on {cell[1]}: {tally.done} of {counted(tally.total, 'trial')}, "
             f"{tally.rate:.0f} trials/s, {_clock(self.eta(tally))} to go, {tally.failed} failed, "
             f"compiled in {tally.compiling:.1f} s"
         )

@@ -30,6 +30,7 @@ from martths_jax.study.signals import store_signals
 from martths_jax.study.store import RunFolder
 from martths_jax.study.summary import summarise
 from martths_jax.study.template import write_config
+from martths_jax.text import counted
 from martths_jax.watch import Status
 
 
@@ -120,8 +121,9 @@ def make_engine(plan: Plan, reporter: Reporter) -> Engine:
     engine = Engine(plan, devices[:count], chunk)
     size = chunk * lane_bytes(samples, plan.noise.channels)
     reporter.notice(
-        f"Seed {plan.config.seed}; {plan.trials} trials and the nominal plant on {count} "
-        f"{devices[0].platform} device(s), in chunks of {chunk} trials (about {size / GB:.2g} GB)."
+        f"Seed {plan.config.seed}; {counted(plan.trials, 'trial')} and the nominal plant on "
+        f"{counted(count, f'{devices[0].platform} device')}, in chunks of {chunk} trials "
+        f"(about {size / GB:.2g} GB)."
     )
     tell_notices(plan.motions, reporter)
     return engine

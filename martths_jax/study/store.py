@@ -17,15 +17,16 @@ import shutil
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from urllib.parse import quote
 
 import numpy as np
 
 from martths_jax.errors import InputError, raise_all
+from martths_jax.files import safe_name
 from martths_jax.study import provenance
 from martths_jax.study.draws import Draws, read_plants, write_plants
 from martths_jax.study.engine import Outcome
 from martths_jax.study.files import disk_errors, remove_leftovers, write_text, writing
+from martths_jax.text import counted
 
 #: Version of the folder's and the result file's layout.
 FORMAT = 1
@@ -131,9 +132,9 @@ class RunFolder:
             )
         if asked["trials"] < self.header["trials"]:
             raise InputError(
-                f"{self.path} holds a {self.what} of {self.header['trials']} trials, but "
-                f"{asked['trials']} were asked for; a {self.what} can be extended, not shortened.  "
-                f"{remedy}"
+                f"{self.path} holds a {self.what} of {counted(self.header['trials'], 'trial')}, "
+                f"but {asked['trials']} were asked for; a {self.what} can be extended, not "
+                f"shortened.  {remedy}"
             )
         changed = dict(self.header)
         if asked["trials"] > self.header["trials"]:
@@ -169,7 +170,7 @@ class RunFolder:
 
     def folder(self, controller: str, motion: str) -> Path:
         """Where the parts of a controller and motion are."""
-        return self.path / "parts" / quote(controller, safe="") / quote(motion, safe=" ")
+        return self.path / "parts" / safe_name(controller, space=False) / safe_name(motion)
 
     def parts(self, controller: str, motion: str) -> Iterator[tuple[int, int, Path]]:
         """(first trial, last trial, path) of every part, by first trial."""

@@ -13,6 +13,7 @@ from rich.table import Table as RichTable
 from martths_jax import published
 from martths_jax.indices import NAMES
 from martths_jax.study.statistics import LEVEL, PERCENTS, Estimate, compare, percentile
+from martths_jax.text import counted, markdown_text
 from martths_jax.watch import Status
 
 #: The paper's comparison: this controller against that one.
@@ -37,10 +38,11 @@ class Table:
 
     def markdown(self) -> str:
         """The table in Markdown."""
-        line = lambda cells: "| " + " | ".join(cells) + " |"  # noqa: E731
+        line = lambda cells: f"| {' | '.join(markdown_text(c, cell=True) for c in cells)} |"  # noqa: E731
         rule = line(["---", *["---:"] * (len(self.columns) - 1)])
         body = "\n".join([line(self.columns), rule, *map(line, self.rows)])
-        return "\n\n".join([f"## {self.title}", body, *self.notes]) + "\n"
+        title, notes = f"## {markdown_text(self.title)}", map(markdown_text, self.notes)
+        return "\n\n".join([title, body, *notes]) + "\n"
 
     def __rich__(self) -> RichTable:
         table = RichTable(
@@ -69,7 +71,8 @@ class Summary:
 
     def markdown(self) -> str:
         """The whole summary in Markdown."""
-        return "\n".join([f"# {self.heading}\n", *(t.markdown() for t in self.tables)])
+        heading = f"# {markdown_text(self.heading)}\n"
+        return "\n".join([heading, *(table.markdown() for table in self.tables)])
 
     __str__ = markdown
 
@@ -87,15 +90,11 @@ def summarise(dataset: xr.Dataset) -> Summary:
 
 def extent(dataset: xr.Dataset) -> str:
     """How much was run, in words."""
-
-    def counted(dimension: str, noun: str) -> str:
-        number = dataset.sizes[dimension]
-        return f"{number} {noun}{'' if number == 1 else 's'}"
-
-    plants = dataset.sizes["trial"] - 1  # trial 0 is the nominal plant
+    sizes = dataset.sizes
     return (
-        f"{plants} uncertain plant{'' if plants == 1 else 's'}, {counted('motion', 'motion')}, "
-        f"{counted('controller', 'controller')}, seed {dataset.attrs['seed']}"
+        f"{counted(sizes['trial'] - 1, 'uncertain plant')}, "  # trial 0 is the nominal plant
+        f"{counted(sizes['motion'], 'motion')}, {counted(sizes['controller'], 'controller')}, "
+        f"seed {dataset.attrs['seed']}"
     )
 
 
