@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
+import io
 import os
 import re
 import unicodedata
@@ -17,9 +19,10 @@ from martths_jax.errors import InputError
 LONGEST_NAME = 200
 #: Names that are devices on Windows, whatever ending they have.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d) *(\.|$)", re.IGNORECASE)
+#: The system's words for no more room: disk, quota, size of a file, a disk that fails.
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 #: Kinds of characters that no name may have: controls, halves of characters, ends of lines.
 _NO_TEXT = ("Cc", "Cs", "Zl", "Zp")
-_ERRNO = re.compile(r"errno = (\d+)")
 
 
 @contextmanager
@@ -35,8 +38,8 @@ def atomic(path: Path | str) -> Iterator[Path]:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part
         os.replace(part, path)
-    except (OSError, RuntimeError) as error:
-        refused = system_error(error)
+    except Exception as error:
+        refused = refusal(error)
         if refused is None:
             raise
         raise InputError(
@@ -47,18 +50,78 @@ def atomic(path: Path | str) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
-def system_error(error: BaseException) -> OSError | None:
-    """What the system refused, of an error that a writer raised; None for any other error.
+def refusal(error: BaseException | None) -> OSError | None:
+    """What the system refused, where that is behind an error that a writer raised; else None.
 
-    HDF5 raises ``RuntimeError`` where a full disk shows only as a file is closed, and keeps the
-    system's number in its text.
+    A library that tidies up after a full disk may fail once more, with an error of another kind
+    (``zlib.error`` from matplotlib's PDF): then the system's stands in its context.
     """
-    if isinstance(error, OSError) and error.errno is not None and error.strerror:
-        found = _ERRNO.search(error.strerror)
-        return OSError(int(found[1]), os.strerror(int(found[1]))) if found else error
-    if isinstance(error, (OSError, RuntimeError)) and (found := _ERRNO.search(str(error))):
-        return OSError(int(found[1]), os.strerror(int(found[1])))
-    return error if isinstance(error, OSError) else None
+    if isinstance(error, OSError):
+        return error
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in _FULL:
+            return error
+        error = error.__cause__ or error.__context__
+    return None
+
+
+class _Forgiving(io.RawIOBase):
+    """A file that keeps what the system refuses, and goes on as if it had been written."""
+
+    def __init__(self, path: Path, mode: str):
+        self.file, self.refused = open(path, mode, buffering=0), None
+
+    def _attempt(self, do, *args):
+        if self.refused is None:
+            try:
+                return do(*args)
+            except OSError as error:
+                self.refused = error
+        return None
+
+    def _write_all(self, data) -> None:
+        left = memoryview(data).cast("B")
+        while left:  # a file near its limit takes a part, and refuses the next
+            left = left[self.file.write(left) :]
+
+    def write(self, data) -> int:
+        self._attempt(self._write_all, data)
+        return memoryview(data).nbytes
+
+    def truncate(self, size: int | None = None) -> int:
+        self._attempt(self.file.truncate, size)
+        return size or 0
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        return self.file.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self.file.tell()
+
+    def readinto(self, buffer) -> int:
+        return self.file.readinto(buffer)
+
+    def close(self) -> None:
+        self._attempt(self.file.close)
+        super().close()
+
+
+@contextmanager
+def forgiving(path: Path, mode: str) -> Iterator[io.RawIOBase]:
+    """A file for a library that does not survive a write that fails; what failed is raised after.
+
+    HDF5 is one: where a disk is full as it closes a file, it takes the process down soon after.
+
+    Raises:
+        OSError: what the system refused, whatever the library said of the file it then found.
+    """
+    file = _Forgiving(path, mode)
+    try:
+        yield file
+    finally:
+        file.close()
+        if file.refused is not None:
+            raise file.refused
 
 
 def safe_name(name: str, space: bool = True) -> str:

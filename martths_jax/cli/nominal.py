@@ -137,7 +137,10 @@ def _save_run(out: Path, motion, result, settings: dict) -> None:
         np.savez_compressed(
             part, time=motion.time, ground=motion.acceleration, ref=result.reference, **signals
         )
-    with atomic(out / f"{stem}_indices.csv") as part, part.open("w", newline="") as file:
+    with (
+        atomic(out / f"{stem}_indices.csv") as part,
+        part.open("w", encoding="utf-8", newline="") as file,
+    ):
         writer = csv.writer(file)
         writer.writerow(["index", "value"])
         writer.writerows((name, repr(float(v[0]))) for name, v in indices(result).items())
@@ -152,7 +155,7 @@ def _save_run(out: Path, motion, result, settings: dict) -> None:
         "volt_peak": np.asarray(result.watch.volt_peak)[:, 0].tolist(),
     }
     with atomic(out / f"{stem}_run.json") as part:
-        part.write_text(json.dumps(about, indent=2) + "\n")
+        part.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
 
 def _print_indices(result) -> None:
@@ -193,7 +196,7 @@ def table4(
     if out:
         for name, text in (("table4.md", found.to_markdown()), ("table4.csv", found.to_csv())):
             with atomic(out / name) as part:
-                part.write_text(text)
+                part.write_text(text, encoding="utf-8")
         console.print(f"Saved in {out}", highlight=False)
 
 

@@ -11,11 +11,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import h5netcdf
 import h5py
 import numpy as np
 import xarray as xr
 
 from martths_jax.errors import InputError
+from martths_jax.files import forgiving
 from martths_jax.indices import NAMES
 from martths_jax.plant import PARAMETERS, Plants
 from martths_jax.study.engine import FIRSTS
@@ -150,8 +152,10 @@ def write_dataset(dataset: xr.Dataset, path: Path, group: str | None = None) -> 
     stored.attrs = {k: _fixed(v) for k, v in stored.attrs.items()}
     # No fill value beside NaN itself: nothing is missing, and a NaN is a trial that diverged.
     plain = {name: {"_FillValue": None} for name in stored.variables}
-    stored.to_netcdf(path, mode="a" if group else "w", engine="h5netcdf", group=group,
-                     encoding=plain)  # fmt: skip
+    with forgiving(path, "r+b" if group else "w+b") as file:
+        with h5netcdf.File(file, "a" if group else "w") as root:
+            store = xr.backends.H5NetCDFStore(root, group, mode="a")
+            stored.dump_to_store(store, encoding=plain)
 
 
 def _fixed(value):

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from martths_jax.benchmark import Benchmark
+from martths_jax.files import atomic
 from martths_jax.indices import NAMES, indices
 from martths_jax.motions import Motion
 from martths_jax.plant import draw_plants
@@ -37,7 +38,8 @@ def write_report(
     """
     design = {name: 10.0**value for name, value in state["best"].items()}
     report = {"controller": controller, "ended": state["ended"] or "all steps done", **design}
-    (folder / "design.json").write_text(json.dumps(report, indent=1) + "\n")
+    with atomic(folder / "design.json") as part:
+        part.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     _write_csv(folder / "history.csv", state["history"])
     _plot(state["history"], folder / "convergence.png")
     rows = compare(benchmark, controller, state, check, plants)
@@ -73,7 +75,7 @@ def compare(benchmark, controller, state, check: Motion, plants: int) -> list[di
 
 
 def _write_csv(path: Path, rows: list[dict]) -> None:
-    with path.open("w", newline="") as file:
+    with atomic(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
@@ -98,5 +100,6 @@ def _plot(history: list[dict], path: Path) -> None:
     bottom.set_xlabel("step")
     bottom.set_ylabel("change of log10")
     bottom.legend(ncols=3, fontsize="small")
-    figure.savefig(path, dpi=150)
+    with atomic(path) as part:
+        figure.savefig(part, dpi=150)
     plt.close(figure)
