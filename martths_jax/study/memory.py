@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import psutil
-
 from martths_jax.errors import InputError
+from martths_jax.resources import available_memory
 from martths_jax.simulation import room_for
 
 GB = 1e9
@@ -37,7 +36,7 @@ def choose_chunk(
     Raises:
         InputError: if not even one device's trials fit.
     """
-    free = psutil.virtual_memory().available
+    free = available_memory()
     bound = memory_gb * GB if memory_gb else min(free / 4, ENOUGH)
     each = lane_bytes(samples, channels) * lanes
     # One block a device is the least there is; then it may take half of what is free.

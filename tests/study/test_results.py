@@ -175,8 +175,7 @@ def test_what_a_command_refuses(words, message):
 
 def test_the_chunk_follows_the_memory(monkeypatch):
     free = {"available": 20e9}
-    memory = type("M", (), {"available": property(lambda _: free["available"])})()
-    monkeypatch.setattr(memory_module.psutil, "virtual_memory", lambda: memory)
+    monkeypatch.setattr(memory_module, "available_memory", lambda: free["available"])
     each = lane_bytes(52_162, 1)
     devices, chunk = choose_chunk(52_162, 1, 128, 2)
     assert devices == 2 and chunk == 256 and chunk * each <= 0.5e9
