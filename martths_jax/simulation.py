@@ -23,7 +23,6 @@ from martths_jax.plant import Plants
 from martths_jax.runtime import compiler_options
 from martths_jax.sensors import SensorNoise, unit_noise
 from martths_jax.structure.modal import respond
-from martths_jax.text import counted
 from martths_jax.watch import Status
 
 #: Trials a device runs side by side: enough for wide vectors, few enough to stay in its cache.
@@ -81,8 +80,8 @@ class Result:
         counts = {s.name.lower(): int(np.sum(self.status == s)) for s in Status}
         ended = ", ".join(f"{n} {name}" for name, n in counts.items() if n)
         return (
-            f"{self.controller} on {self.motion}: {counted(len(self.trial), 'trial')} at "
-            f"{self.fs:g} Hz, {self.reference.shape[0]} samples; {ended}"
+            f"{self.controller} on {self.motion}: {len(self.trial)} trials at {self.fs:g} Hz, "
+            f"{self.reference.shape[0]} samples; {ended}"
         )
 
 

@@ -17,6 +17,15 @@ def counted(number: int, noun: str, plural: str | None = None) -> str:
     return f"{number} {noun if number == 1 else plural or noun + 's'}"
 
 
+def shortened(value: object, most: int = 80) -> str:
+    """``repr`` of a value for a message, cut where it is long."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python writes out no integer of more than 4300 digits
+        return "a number of more than 4300 digits"
+    return text if len(text) <= most else f"{text[:most]} ... ({len(text)} characters)"
+
+
 def csv_cell(value: object) -> object:
     """A cell that stays what it is in a spreadsheet; numbers are left alone.
 

@@ -57,9 +57,14 @@ def main() -> None:
     try:
         app()
     except InputError as error:
-        text = f"[bold red]Error:[/] {escape(str(error))}"
-        error_console.print(text, highlight=False, soft_wrap=True)
-        sys.exit(2)
+        _fail(str(error))
+    except MemoryError as error:
+        _fail(f"There is not enough memory ({error or 'nothing more can be taken'}).")
     except KeyboardInterrupt:
         error_console.print("Interrupted; no half-written file was left.")
         sys.exit(130)
+
+
+def _fail(text: str) -> None:
+    error_console.print(f"[bold red]Error:[/] {escape(text)}", highlight=False, soft_wrap=True)
+    sys.exit(2)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from martths_jax.errors import raise_all
+from martths_jax.errors import argument_error, raise_all
 from martths_jax.indices import NAMES
 from martths_jax.plant import check_plants
-from martths_jax.sensitivity.design import Design, is_power_of_two, make_design
+from martths_jax.sensitivity.design import Design, is_power_of_two, make_design, most_samples
 from martths_jax.sensitivity.results import Sensitivity, write_results
 from martths_jax.sensitivity.store import ROWS, SensitivityFolder
 from martths_jax.simulation import LANES, Setup
@@ -100,6 +100,10 @@ def build(config, shown: tuple[str, ...], changes: dict) -> tuple[Plan, Design]:
             f"Argument `trials` must be a power of two, which Sobol' points are balanced at, but "
             f"got {study.trials}; {near} is the nearest."
         )
+    elif study.trials > (most := most_samples()):
+        problems.append(str(argument_error(
+            "trials", f"be at most {most}, whose design fits into memory", study.trials
+        )))  # fmt: skip
     if study.plants is not None or study.draws != "independent":
         problems.append(
             "Arguments `plants` and `draws` have no place here: the design draws the plants."

@@ -22,7 +22,7 @@ from martths_jax.study.distributed import wait_for_all
 from martths_jax.study.engine import Engine, choose_devices
 from martths_jax.study.export import write_csv
 from martths_jax.study.files import alone, write_text
-from martths_jax.study.memory import GB, choose_chunk, lane_bytes
+from martths_jax.study.memory import GB, check_results, choose_chunk, lane_bytes
 from martths_jax.study.plan import Plan, build_plan
 from martths_jax.study.progress import Reporter, Tally, compile_seconds
 from martths_jax.study.results import Study
@@ -71,6 +71,8 @@ def run_study(
             "another has just stored; remove the folder first, or choose another --out."
         )
     plan = build_plan(config)
+    if share is None:
+        check_results(plan.trials + 1, len(plan.controllers) * len(plan.motions))
     reporter = reporter or Reporter()
     run = RunFolder.start(Path(config.out), header(plan, command_line), fresh)
     run.keep_draws(plan.draws)
