@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from martths_jax import __version__
 from martths_jax.cli import figures, motions, nominal, sensitivity, study, sweep, tune
-from martths_jax.cli.console import error_console
+from martths_jax.cli.console import accept_any_text, error_console
 from martths_jax.errors import InputError
 
 app = typer.Typer(
@@ -54,6 +54,7 @@ def _root(
 
 def main() -> None:
     """Run the command line: user errors are one message and exit code 2, Ctrl-C is 130."""
+    accept_any_text()
     try:
         app()
     except InputError as error:

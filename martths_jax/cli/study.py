@@ -216,7 +216,7 @@ def _share(text: str | None) -> tuple[int, int] | None:
 def _show(done: Study, quiet: bool, max_failed: int | None = None) -> None:
     if not quiet:
         found = done.summary()
-        console.print(f"[bold]{escape(found.heading)}")
+        console.print(f"[bold]{escape(found.heading)}", highlight=False, soft_wrap=True)
         for table in found.tables:
             console.print(table)
         console.print(f"Results are in {escape(str(done.folder))}: study.nc, study.csv, summary.md",

@@ -199,7 +199,9 @@ def summarise(found: Sensitivity) -> Summary:
             tables.append(Table(title, ("index", *factors), rows, (note,)))
         rows = [(n, text) for (c, n), text in found.notes.items() if c == controller]
         if rows:
-            tables.append(Table(f"What limits them, {controller}", ("index", "note"), rows))
+            tables.append(
+                Table(f"What limits them, {controller}", ("index", "note"), rows, text=("note",))
+            )
     heading = (
         f"Global sensitivity: N = {data.sizes['sample']} base samples, "
         f"{counted(len(factors), 'factor')}, "
@@ -221,7 +223,7 @@ def leading(found: Sensitivity, controller: str, most: int = 3) -> Table:
         ]
         rows.append((name, *cells, *[""] * (most - len(cells)), note.split(":")[0]))
     heads = ("index", *(f"{n}." for n in range(1, most + 1)), "note")
-    return Table(f"Largest total Sobol' indices, {controller}", heads, rows)
+    return Table(f"Largest total Sobol' indices, {controller}", heads, rows, text=heads[1:])
 
 
 def _cell(value: float, low: float, high: float) -> str:

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from rich.box import SIMPLE
-from rich.markup import escape
-from rich.table import Table as RichTable
 
 from martths_jax import published
 from martths_jax.indices import NAMES
+from martths_jax.screen import ScreenTable
 from martths_jax.study.statistics import LEVEL, PERCENTS, Estimate, compare, percentile
 from martths_jax.text import counted, markdown_text
 from martths_jax.watch import Status
@@ -27,7 +25,9 @@ class Table:
     Attributes:
         title: what it shows; notes: sentences below it.
         columns: heads; rows: cells.
-        aside: columns that a narrow terminal has no room for.
+        aside: columns that a terminal has no room for.
+        keys: number of columns that say what a row is.
+        text: columns of text, which may be folded.
     """
 
     title: str
@@ -35,6 +35,8 @@ class Table:
     rows: list[tuple[str, ...]]
     notes: tuple[str, ...] = ()
     aside: tuple[str, ...] = ()
+    keys: int = 1
+    text: tuple[str, ...] = ()
 
     def markdown(self) -> str:
         """The table in Markdown."""
@@ -44,22 +46,13 @@ class Table:
         title, notes = f"## {markdown_text(self.title)}", map(markdown_text, self.notes)
         return "\n\n".join([title, body, *notes]) + "\n"
 
-    def __rich__(self) -> RichTable:
-        table = RichTable(
-            title=escape(self.title),
-            caption=escape(" ".join(self.notes)) or None,
-            box=SIMPLE,
-            padding=(0, 1, 0, 0),
-            show_edge=False,
-        )
+    def __rich__(self) -> ScreenTable:
         shown = [i for i, column in enumerate(self.columns) if column not in self.aside]
-        for i in shown:
-            table.add_column(
-                escape(self.columns[i]), justify="right" if i else "left", overflow="fold"
-            )
-        for row in self.rows:
-            table.add_row(*(escape(row[i]) for i in shown))
-        return table
+        pick = lambda cells: tuple(cells[i] for i in shown)  # noqa: E731
+        rows = [pick(row) for row in self.rows]
+        return ScreenTable(
+            self.title, pick(self.columns), rows, self.notes, keys=self.keys, text=self.text
+        )
 
 
 @dataclass(frozen=True)
@@ -118,7 +111,8 @@ def _ends(dataset, cells) -> Table:
         counts = [str(int(np.sum(status == s))) for s in Status]
         rows.append((controller, motion, str(status.size), *counts, number(peak)))
     heads = ("controller", "motion", "trials", *(s.name.lower() for s in Status), "peak [V]")
-    return Table("How the uncertain trials ended", heads, rows)
+    names = ("controller", "motion")
+    return Table("How the uncertain trials ended", heads, rows, keys=2, text=names)
 
 
 def _percentiles(dataset, controller: str, motion: str) -> Table:

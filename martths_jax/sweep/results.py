@@ -216,6 +216,6 @@ def summarise(sweep: Sweep, shown: tuple[str, ...]) -> Summary:
                 rows.append((*where, f"{100 * float(lost[at]):.1f}", *pairs))
             heads = (*(a.name for a in axes), "lost [%]", *shown)
             note = "Median / 95th percentile over the uncertain trials that finished."
-            tables.append(Table(f"{controller} on {motion}", heads, rows, (note,)))
+            tables.append(Table(f"{controller} on {motion}", heads, rows, (note,), keys=len(axes)))
     sizes = " x ".join(f"{len(a.values)} {a.name}" for a in axes)
     return Summary(f"Sweep of {sizes}: {extent(data)}", tables)
