@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import jax
 import numpy as np
-import psutil
 
 from martths_jax.benchmark import Benchmark
 from martths_jax.controllers import Controller
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import Motion
+from martths_jax.resources import available_memory
 from martths_jax.sensors import SensorNoise
 
 #: Numbers a sample and trial that ``keep=True`` stores, ADFC's coefficients among them.
@@ -48,7 +48,7 @@ def check_simulation(benchmark, controller, plants, motion, noise, keep=False, p
     expect(isinstance(keep, (bool, np.bool_)), "keep", "be True or False", repr(keep))
     expect(progress is None or callable(progress), "progress", "be callable", _kind(progress))
     if keep is True and trials and samples:
-        need, free = 8.0 * KEPT_NUMBERS * trials * samples, psutil.virtual_memory().available
+        need, free = 8.0 * KEPT_NUMBERS * trials * samples, available_memory()
         expect(
             need <= MEMORY_SHARE * free, "keep", f"fit into {MEMORY_SHARE * free / 2**30:.3g} GiB",
             f"{trials} trials of {samples} samples, about {need / 2**30:.3g} GiB",

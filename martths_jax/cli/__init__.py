@@ -12,7 +12,7 @@ from rich.markup import escape
 
 from martths_jax import __version__
 from martths_jax.cli import figures, motions, nominal, sensitivity, study, sweep, tune
-from martths_jax.cli.console import error_console
+from martths_jax.cli.console import accept_any_text, error_console
 from martths_jax.errors import InputError
 
 app = typer.Typer(
@@ -56,14 +56,20 @@ def _root(
 
 def main() -> None:
     """Run the command line: user errors are one message and exit code 2, Ctrl-C is 130."""
+    accept_any_text()
     try:
         app()
     except InputError as error:
-        text = f"[bold red]Error:[/] {escape(str(error))}"
-        error_console.print(text, highlight=False, soft_wrap=True)
-        sys.exit(2)
+        _fail(str(error))
+    except MemoryError as error:
+        _fail(f"There is not enough memory ({error or 'nothing more can be taken'}).")
     except KeyboardInterrupt:
         # A second one, while Python and JAX clean up, ends the process at once and without a word.
         signal.signal(signal.SIGINT, lambda *_: os._exit(130))
         error_console.print("Interrupted; no half-written file was left.")
         sys.exit(130)
+
+
+def _fail(text: str) -> None:
+    error_console.print(f"[bold red]Error:[/] {escape(text)}", highlight=False, soft_wrap=True)
+    sys.exit(2)

@@ -12,6 +12,7 @@ from martths_jax.cli.motion_options import Records
 from martths_jax.cli.study import Folder
 from martths_jax.files import atomic
 from martths_jax.study import Lines, open_study
+from martths_jax.text import counted
 
 Trial = Annotated[
     int, typer.Option("--trial", min=0, help="Whose histories are drawn; 0 = nominal plant.")
@@ -40,7 +41,7 @@ def figures(
     paths = draw_figures(
         folder, out, trial=trial, motion=motion, only=only or (), dpi=dpi, progress=_tell
     )
-    _say(f"{len(paths)} files are in {out}")
+    _say(f"Wrote {counted(len(paths), 'file')} to {out}")
 
 
 def _tell(name: str) -> None:

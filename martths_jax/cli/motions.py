@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress
-from rich.table import Table
 
+from martths_jax.cli.console import console
 from martths_jax.cli.motion_options import Records, Units
 from martths_jax.motions import MotionInfo, available_motions, load_record, write_ensemble
 from martths_jax.motions.figure import draw_motion
 from martths_jax.motions.overview import FIRST_MODE
 from martths_jax.motions.units import G
+from martths_jax.screen import ScreenTable
+from martths_jax.text import counted
 
 app = typer.Typer(help="List, show and make ground motions.")
-console = Console()
 
 COLUMNS = (
     ("dt [s]", lambda i: f"{i.dt:.4g}"),
@@ -39,19 +39,13 @@ def motions(context: typer.Context, records: Records = None, units: Units = None
         console.print(_table(available_motions(records, units)))
 
 
-def _table(found: list[MotionInfo]) -> Table:
-    table = Table(title="Ground motions, unscaled; 5 % damping")
-    table.add_column("name", overflow="fold")
-    for title, _ in COLUMNS:
-        table.add_column(escape(title), justify="right")
-    table.add_column("from", overflow="fold")
+def _table(found: list[MotionInfo]) -> ScreenTable:
+    rows = []
     for info in found:
-        if info.problem:
-            cells = ["?"] * len(COLUMNS)
-        else:
-            cells = [text(info) for _, text in COLUMNS]
-        table.add_row(escape(info.name), *cells, escape(info.problem or info.source))
-    return table
+        cells = ["?" if info.problem else text(info) for _, text in COLUMNS]
+        rows.append((info.name, *cells, info.problem or info.source))
+    heads = ("name", *(title for title, _ in COLUMNS), "from")
+    return ScreenTable("Ground motions, unscaled; 5 % damping", heads, rows, text=("name", "from"))
 
 
 @app.command()
@@ -91,7 +85,7 @@ def make(
         )
     accepted = sum(line["accepted"] for line in lines)
     console.print(
-        f"Wrote {len(lines)} motions to {escape(str(out))}; {accepted} of them are within the "
+        f"Wrote {counted(len(lines), 'motion')} to {escape(str(out))}; {accepted} within the "
         "limits on spectrum, PGA, Arias intensity and D5-95 (see ensemble.json).",
         soft_wrap=True,
     )

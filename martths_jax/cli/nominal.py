@@ -10,7 +10,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.table import Table
 
 from martths_jax import published
 from martths_jax.benchmark import build_benchmark
@@ -32,6 +31,7 @@ from martths_jax.indices import indices
 from martths_jax.motions import available_motions
 from martths_jax.nominal import Comparison, compare_with_table4
 from martths_jax.plant import draw_plants, nominal_plant
+from martths_jax.screen import ScreenTable
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import simulate
 from martths_jax.structure.frame import build_reference
@@ -71,15 +71,12 @@ def default_motions(records: Path | None) -> list[str]:
 def modes() -> None:
     """Natural modes of the reference structure beside Table 1 of the benchmark."""
     found = natural_modes(build_reference())
-    table = Table(title="Reference structure: Table 1")
-    for title in ("mode", "f [Hz]", "published", "effective mass in x [%]", "published"):
-        table.add_column(title, justify="right")
+    rows = []
     for mode, (f, mass) in published.TABLE1.items():
         ours_f, ours_mass = found.frequency[mode - 1], 100 * found.effective_mass[mode - 1]
-        table.add_row(
-            str(mode), f"{ours_f:.4f}", f"{f:.4f}", f"{_like(ours_mass, mass)}", f"{mass:g}"
-        )
-    console.print(table)
+        rows.append((str(mode), f"{ours_f:.4f}", f"{f:.4f}", _like(ours_mass, mass), f"{mass:g}"))
+    heads = ("mode", "f [Hz]", "published", "effective mass in x [%]", "published")
+    console.print(ScreenTable("Reference structure: Table 1", heads, rows))
 
 
 def _like(value: float, printed: float) -> str:
@@ -137,7 +134,10 @@ def _save_run(out: Path, motion, result, settings: dict) -> None:
         np.savez_compressed(
             part, time=motion.time, ground=motion.acceleration, ref=result.reference, **signals
         )
-    with atomic(out / f"{stem}_indices.csv") as part, part.open("w", newline="") as file:
+    with (
+        atomic(out / f"{stem}_indices.csv") as part,
+        part.open("w", encoding="utf-8", newline="") as file,
+    ):
         writer = csv.writer(file)
         writer.writerow(["index", "value"])
         writer.writerows((name, repr(float(v[0]))) for name, v in indices(result).items())
@@ -152,18 +152,15 @@ def _save_run(out: Path, motion, result, settings: dict) -> None:
         "volt_peak": np.asarray(result.watch.volt_peak)[:, 0].tolist(),
     }
     with atomic(out / f"{stem}_run.json") as part:
-        part.write_text(json.dumps(about, indent=2) + "\n")
+        part.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
 
 def _print_indices(result) -> None:
-    table = Table(title=f"{result.controller}, {result.motion}: J1, J4 in ms, the others in %")
-    values = list(indices(result).items())
-    for _ in range(4):
-        table.add_column("index")
-        table.add_column("value", justify="right")
-    for i in range(0, len(values), 4):
-        table.add_row(*[c for name, v in values[i : i + 4] for c in (name, f"{v[0]:.3f}")])
-    console.print(table)
+    rows = [(name, f"{value[0]:.3f}") for name, value in indices(result).items()]
+    # Four indices a line.
+    lines = [tuple(c for row in rows[i : i + 4] for c in row) for i in range(0, len(rows), 4)]
+    title = f"{result.controller}, {result.motion}: J1, J4 in ms, the others in %"
+    console.print(ScreenTable(title, ("index", "value") * 4, lines, keys=0, text=("index",)))
 
 
 def table4(
@@ -193,16 +190,12 @@ def table4(
     if out:
         for name, text in (("table4.md", found.to_markdown()), ("table4.csv", found.to_csv())):
             with atomic(out / name) as part:
-                part.write_text(text)
+                part.write_text(text, encoding="utf-8")
         console.print(f"Saved in {out}", highlight=False)
 
 
 def _print_comparison(found: Comparison) -> None:
-    table = Table(title=f"Table 4, nominal plant, mean over {', '.join(found.motions)}")
-    table.add_column("index")
-    for name in found.ours:
-        for title in (name, "paper", "deviation"):
-            table.add_column(title, justify="right")
-    for index, cells in found.cells().items():
-        table.add_row(index, *cells)
-    console.print(table)
+    heads = ("index", *(head for name in found.ours for head in (name, "paper", "deviation")))
+    rows = [(index, *cells) for index, cells in found.cells().items()]
+    title = f"Table 4, nominal plant, mean over {', '.join(found.motions)}"
+    console.print(ScreenTable(title, heads, rows))

@@ -93,7 +93,7 @@ def sensitivity(
         raise
     if quiet:
         return
-    console.print(f"[bold]{escape(done.summary().heading)}")
+    console.print(f"[bold]{escape(done.summary().heading)}", highlight=False, soft_wrap=True)
     for controller in done.dataset.controller.values:
         console.print(leading(done, str(controller)))
     console.print(

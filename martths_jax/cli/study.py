@@ -26,6 +26,7 @@ from martths_jax.study.distributed import JOIN_TIMEOUT, LOST_TIMEOUT, join
 from martths_jax.study.export import export_plants, write_csv, write_mat
 from martths_jax.study.provenance import command_line
 from martths_jax.study.template import write_template
+from martths_jax.text import counted
 
 Folder = Annotated[Path, typer.Argument(help="Folder of a study.")]
 Keep = Annotated[
@@ -227,14 +228,14 @@ def _share(text: str | None) -> tuple[int, int] | None:
 def _show(done: Study, quiet: bool, max_failed: int | None = None) -> None:
     if not quiet:
         found = done.summary()
-        console.print(f"[bold]{escape(found.heading)}")
+        console.print(f"[bold]{escape(found.heading)}", highlight=False, soft_wrap=True)
         for table in found.tables:
             console.print(table)
         console.print(f"Results are in {escape(str(done.folder))}: study.nc, study.csv, summary.md",
                       highlight=False, soft_wrap=True)  # fmt: skip
     if max_failed is not None and done.failed > max_failed:
         error_console.print(
-            f"{done.failed} runs diverged, more than --max-failed {max_failed} allows.",
+            f"{counted(done.failed, 'run')} diverged, more than --max-failed {max_failed} allows.",
             highlight=False, soft_wrap=True,
         )  # fmt: skip
         raise typer.Exit(1)

@@ -118,7 +118,7 @@ def sweep(
     if quiet:
         return
     found = done.summary(chosen.shown)
-    console.print(f"[bold]{escape(found.heading)}")
+    console.print(f"[bold]{escape(found.heading)}", highlight=False, soft_wrap=True)
     for table in found.tables:
         if len(table.rows) <= MOST_ROWS:
             console.print(table)

@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from martths_jax.benchmark import VOLT_LIMIT, build_benchmark
 from martths_jax.cli.console import console, error_console
 from martths_jax.cli.motion_options import Records, Scale, load_all
 from martths_jax.errors import InputError
+from martths_jax.screen import ScreenTable
+from martths_jax.text import counted
 from martths_jax.tune import Options
 from martths_jax.tune import tune as run_tuning
 from martths_jax.tune.report import write_report
@@ -94,11 +95,11 @@ def _notice(text: str) -> None:
     error_console.print(text, highlight=False, markup=False, soft_wrap=True)
 
 
-def _table(rows: list[dict], controller: str, motion: str, plants: int) -> Table:
-    table = Table(title=f"{controller} on {motion}, medians of {plants} fresh plants")
-    for title in ("index", "start", "tuned", "published (nominal, mean of three records)"):
-        table.add_column(title, justify="left" if title == "index" else "right")
+def _table(rows: list[dict], controller: str, motion: str, plants: int) -> ScreenTable:
+    heads = ("index", "start", "tuned", "published (nominal, mean of three records)")
+    cells = []
     for row in rows:
         published = f"{row['published']:.2f}" if row["published"] != "" else ""
-        table.add_row(row["index"], f"{row['start']:.2f}", f"{row['tuned']:.2f}", published)
-    return table
+        cells.append((row["index"], f"{row['start']:.2f}", f"{row['tuned']:.2f}", published))
+    title = f"{controller} on {motion}, medians of {counted(plants, 'fresh plant')}"
+    return ScreenTable(title, heads, cells)

@@ -21,6 +21,7 @@ from martths_jax.controllers.inverse import nominal_inverse
 from martths_jax.errors import argument_error, raise_all
 from martths_jax.kalman import design_kalman
 from martths_jax.once import once
+from martths_jax.resources import available_memory
 
 #: Backward differences of second order for value and dt^j times the j-th derivative, from
 #: samples k, k-1, ..., k-4 (the paper's C_D, scaled so that the columns stay comparable).
@@ -43,6 +44,8 @@ GUARD_PULL = 6e-5
 ANCHORS = ("start", "inverse")
 #: A fit whose normal matrix is worse conditioned is not used (the paper's bound).
 CONDITION_LIMIT = 1e14
+#: Memory of a row of the buffer for trials side by side, with the inputs of a window [bytes].
+NB_BYTES = 8 * 8 * 128
 
 
 @jax.tree_util.register_dataclass
@@ -106,6 +109,9 @@ class ADFC(Controller):
         nb, no, pull, q = self.nb, known(self.no), known(self.pull), known(self.q)
         whole = isinstance(nb, (int, np.integer))
         expect(whole and nb >= 9, "nb", "be a whole number of at least 9 (8 unknowns)", nb)
+        if whole:
+            room = int(available_memory() / 2 / NB_BYTES)
+            expect(nb <= room, "nb", f"be at most {room}, whose rows fit into memory", nb)
         if whole and no is not None:
             expect(np.all((no >= 0) & (no <= nb - 1)), "no", f"lie in [0, nb - 1 = {nb - 1}]", no)
         if pull is not None:

@@ -16,6 +16,7 @@ from martths_jax.errors import InputError
 from martths_jax.figures import histories, paired, plants, spread, structure, synchronisation
 from martths_jax.figures.source import ZOOM, Source, open_source
 from martths_jax.figures.style import Drawing, house_style, save
+from martths_jax.files import safe_name
 from martths_jax.study.summary import PAIR
 
 __all__ = ["Drawing", "Source", "draw_figures", "drawings", "figure_list", "open_source"]
@@ -29,22 +30,22 @@ def figure_list(source: Source) -> dict[str, Callable[[], Drawing]]:
     """
     found: dict[str, Callable[[], Drawing]] = {}
     numbers = {name: 8 + i for i, name in enumerate(ZOOM)}
+    tails = {c: "" if c == "adfc" else f"_{safe_name(c)}" for c in source.controllers}
     signals = (source.study.folder / "signals.nc").is_file()
     if signals:
         for motion in source.motions:
             number = numbers.get(motion.removesuffix("-like"))
             head = f"fig{number:02d}_" if number else ""
-            found[f"{head}strokes_{motion}"] = partial(histories.strokes, source, motion)
+            found[f"{head}strokes_{safe_name(motion)}"] = partial(histories.strokes, source, motion)
         for controller in source.controllers:
             if "C_A" in source.history(controller, source.motion):
-                name = "fig11_coefficients" + ("" if controller == "adfc" else f"_{controller}")
-                found[name] = partial(histories.coefficients, source, controller)
+                draw = partial(histories.coefficients, source, controller)
+                found[f"fig11_coefficients{tails[controller]}"] = draw
         found["fig12_synchronisation_actuators"] = partial(synchronisation.actuators, source)
         found["fig13_synchronisation_interface"] = partial(synchronisation.interface, source)
     found["fig14a_controllers"] = partial(spread.controllers, source)
     for controller in source.controllers:
-        name = "fig14b_motions" + ("" if controller == "adfc" else f"_{controller}")
-        found[name] = partial(spread.motions, source, controller)
+        found[f"fig14b_motions{tails[controller]}"] = partial(spread.motions, source, controller)
     found["fig15_histograms"] = partial(spread.histograms, source)
     if set(PAIR) <= set(source.controllers):
         found["paired"] = partial(paired.paired, source)

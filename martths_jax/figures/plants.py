@@ -16,6 +16,7 @@ from martths_jax.figures.style import (
     new_figure,
 )
 from martths_jax.plant import NOMINAL_HZ, frequency_response
+from martths_jax.text import counted
 
 FREQUENCY = np.geomspace(0.1, 100.0, 160)  # Hz
 BANDS = ((5, 95, "0.86"), (25, 75, "0.70"))
@@ -53,9 +54,9 @@ def bode(source: Source) -> Drawing:
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     caption = (
-        f"Bode diagrams of the {plants.shape[0]} drawn plants (mm of stroke a mm of command): "
-        "percentile bands over the nominal plant, and their distance from it; the uncertainty of "
-        "the paper's Table 2 seen."
+        f"Bode diagrams of {counted(plants.shape[0], 'drawn plant')} (mm of stroke a mm of "
+        "command): percentile bands over the nominal plant, and their distance from it; the "
+        "uncertainty of the paper's Table 2 seen."
     )
     return Drawing(figure, data, caption)
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from martths_jax.files import atomic
+from martths_jax.text import csv_cell
 
 MM = 1 / 25.4  # inch per mm
 #: Widths of one and of two journal columns [mm].
@@ -139,7 +140,7 @@ def save(drawing: Drawing, folder: Path, name: str, formats=("pdf", "png"), dpi:
     path = Path(folder) / f"{name}.csv"
     with atomic(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(drawing.data)
+        writer.writerow(map(csv_cell, drawing.data))
         columns = [_cells(np.asarray(column)) for column in drawing.data.values()]
         writer.writerows(zip(*columns, strict=True))
     return [*paths, path]
@@ -147,5 +148,5 @@ def save(drawing: Drawing, folder: Path, name: str, formats=("pdf", "png"), dpi:
 
 def _cells(column: np.ndarray) -> list:
     if column.dtype.kind != "f":
-        return column.tolist()
+        return [csv_cell(value) for value in column.tolist()]
     return ["" if x != x else f"{x:.9g}" for x in column.tolist()]

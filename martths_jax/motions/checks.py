@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import psutil
 
 from ..errors import InputError
+from ..resources import available_memory
 
 #: Largest departure of a time stamp from the uniform grid, as a fraction of the step: wide enough
 #: for times printed with few digits, far below one missing or doubled sample.
@@ -21,7 +21,7 @@ _WORK_COPIES = 6
 def check_memory(samples: float, where: str) -> None:
     """Refuse `samples` float64 values (and the copies made of them) that would not fit."""
     need = 8.0 * float(samples) * _WORK_COPIES
-    limit = MEMORY_SHARE * psutil.virtual_memory().available
+    limit = MEMORY_SHARE * available_memory()
     if not need <= limit:
         raise InputError(
             f"{where} needs {samples:.3g} samples, about {need / 2**30:.3g} GiB, but only "

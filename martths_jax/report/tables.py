@@ -15,6 +15,7 @@ from martths_jax.figures.style import controller_label, index_label, motion_labe
 from martths_jax.indices import DELAYS, NAMES
 from martths_jax.study.statistics import PERCENTS, percentile
 from martths_jax.study.summary import Table, number
+from martths_jax.text import csv_cell
 
 FORMATS = ("md", "tex", "csv")
 #: Published columns of Table 4 by the controller they are to be compared with.
@@ -127,7 +128,7 @@ def render(dataset: xr.Dataset, style: str) -> str:
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(("table", "motion", "controller", "index", "unit", "statistic", "value"))
         for *head, value in tidy_rows(dataset):
-            writer.writerow((*head, "" if np.isnan(value) else repr(float(value))))
+            writer.writerow((*map(csv_cell, head), "" if np.isnan(value) else repr(float(value))))
         return text.getvalue()
     raise argument_error("format", f"be one of {', '.join(FORMATS)}", repr(style))
 

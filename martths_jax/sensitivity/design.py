@@ -14,12 +14,16 @@ import numpy as np
 from scipy.stats import norm, qmc
 
 from martths_jax.plant import PARAMETERS, Plants
+from martths_jax.resources import available_memory
+from martths_jax.study.memory import RESULT_BYTES
 
 #: The factor that picks the noise realisation, and the one that picks the motion.
 NOISE, MOTION = "noise", "motion"
 #: Noise realisations the uniform factor picks from; trial numbers of a study lie below.
 STREAMS = 2**30
 FIRST_STREAM = 2**31 - STREAMS
+#: Copies of the points that a design and its estimates make.
+COPIES = 4
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,13 @@ def make_design(samples: int, motions: int, seed: int) -> Design:
     """Design over the plant's nine parameters, the noise and, if there are several, the motion."""
     factors = (*PARAMETERS, NOISE, *([MOTION] if motions > 1 else []))
     return Design(factors, saltelli(samples, len(factors), seed))
+
+
+def most_samples() -> int:
+    """Largest N for which a design fits into the memory that is free."""
+    d = len(PARAMETERS) + 2
+    room = available_memory() / (8 * d * (d + 2) * COPIES + RESULT_BYTES * (d + 2))
+    return 2 ** int(min(30, math.log2(max(room, 2))))
 
 
 def is_power_of_two(value: int) -> bool:

@@ -17,6 +17,7 @@ from martths_jax.figures.style import (
     new_figure,
     save,
 )
+from martths_jax.files import safe_name
 from martths_jax.indices import NAMES
 from martths_jax.sensitivity.estimators import LEVEL
 from martths_jax.sensitivity.results import Sensitivity, indices_of
@@ -32,7 +33,7 @@ def draw_figures(found: Sensitivity, folder: Path, shown: Sequence[str]) -> list
     for controller in found.dataset.controller.values:
         with house_style():
             drawing = tornado(found, str(controller), shown)
-            paths += save(drawing, folder, f"tornado_{controller}")
+            paths += save(drawing, folder, f"tornado_{safe_name(controller)}")
     return paths
 
 

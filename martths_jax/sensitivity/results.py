@@ -19,11 +19,11 @@ from martths_jax.study.dataset import (
     read_results,
     save_dataset,
 )
-from martths_jax.study.export import _quoted
 from martths_jax.study.files import write_text, writing
 from martths_jax.study.plan import Plan
 from martths_jax.study.store import RunFolder
 from martths_jax.study.summary import Summary, Table
+from martths_jax.text import counted, csv_field
 
 ESTIMATES = ("first", "first_low", "first_high", "total", "total_low", "total_high")
 _WORDS = {
@@ -67,8 +67,8 @@ class Sensitivity:
             used = int(self.dataset.used.sel(controller=controller))
             if used < N:
                 found.append(
-                    f"{controller}: {N - used} of {N} base samples hold a run that was lost and "
-                    "are left out; the indices are those of the plants that finish."
+                    f"{controller}: {N - used} of {N} base samples left out, since a run of theirs "
+                    "was lost; the indices are those of the plants that finish."
                 )
         grouped: dict[tuple[str, str], list[str]] = {}
         for (controller, name), text in self.notes.items():
@@ -85,8 +85,8 @@ class Sensitivity:
     def __str__(self) -> str:
         sizes = self.dataset.sizes
         return (
-            f"Sensitivity in {self.folder}: N = {sizes['sample']}, {sizes['factor']} factors, "
-            f"{sizes['controller']} controllers"
+            f"Sensitivity in {self.folder}: N = {sizes['sample']}, "
+            f"{counted(sizes['factor'], 'factor')}, {counted(sizes['controller'], 'controller')}"
         )
 
 
@@ -171,8 +171,8 @@ def write_csv(found: Sensitivity, path: Path) -> None:
                 for j, factor in enumerate(data.factor.values):
                     numbers = [float(data[e].values[c, i, j]) for e in ESTIMATES]
                     cells = ",".join("" if x != x else repr(x) for x in numbers)
-                    note = _quoted(str(data.note.values[c, i]))
-                    start = ",".join(map(_quoted, (str(controller), str(name), str(factor))))
+                    note = csv_field(str(data.note.values[c, i]))
+                    start = ",".join(map(csv_field, (str(controller), str(name), str(factor))))
                     file.write(f"{start},{cells},{note}\n")
 
 
@@ -199,9 +199,12 @@ def summarise(found: Sensitivity) -> Summary:
             tables.append(Table(title, ("index", *factors), rows, (note,)))
         rows = [(n, text) for (c, n), text in found.notes.items() if c == controller]
         if rows:
-            tables.append(Table(f"What limits them, {controller}", ("index", "note"), rows))
+            tables.append(
+                Table(f"What limits them, {controller}", ("index", "note"), rows, text=("note",))
+            )
     heading = (
-        f"Global sensitivity: N = {data.sizes['sample']} base samples, {len(factors)} factors, "
+        f"Global sensitivity: N = {data.sizes['sample']} base samples, "
+        f"{counted(len(factors), 'factor')}, "
         f"{data.sizes['sample'] * data.sizes['row']} runs a controller, seed {data.attrs['seed']}"
     )
     return Summary(heading, tables)
@@ -220,7 +223,7 @@ def leading(found: Sensitivity, controller: str, most: int = 3) -> Table:
         ]
         rows.append((name, *cells, *[""] * (most - len(cells)), note.split(":")[0]))
     heads = ("index", *(f"{n}." for n in range(1, most + 1)), "note")
-    return Table(f"Largest total Sobol' indices, {controller}", heads, rows)
+    return Table(f"Largest total Sobol' indices, {controller}", heads, rows, text=heads[1:])
 
 
 def _cell(value: float, low: float, high: float) -> str:

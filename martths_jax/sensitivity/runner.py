@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from martths_jax.errors import raise_all
+from martths_jax.errors import argument_error, raise_all
 from martths_jax.indices import NAMES
 from martths_jax.plant import check_plants
-from martths_jax.sensitivity.design import Design, is_power_of_two, make_design
+from martths_jax.sensitivity.design import Design, is_power_of_two, make_design, most_samples
 from martths_jax.sensitivity.results import Sensitivity, write_results
 from martths_jax.sensitivity.store import ROWS, SensitivityFolder
 from martths_jax.simulation import LANES, Setup
@@ -23,6 +23,7 @@ from martths_jax.study.progress import Reporter, Tally, compile_seconds
 from martths_jax.study.runner import Session, header
 from martths_jax.sweep.config import SHOWN
 from martths_jax.sweep.lanes import LaneEngine
+from martths_jax.text import counted
 from martths_jax.watch import Status
 
 #: What an analysis has where a study has another default.
@@ -102,6 +103,10 @@ def build(config, shown: tuple[str, ...], changes: dict) -> tuple[Plan, Design]:
             f"Argument `trials` must be a power of two, which Sobol' points are balanced at, but "
             f"got {study.trials}; {near} is the nearest."
         )
+    elif study.trials > (most := most_samples()):
+        problems.append(str(argument_error(
+            "trials", f"be at most {most}, whose design fits into memory", study.trials
+        )))  # fmt: skip
     if study.plants is not None or study.draws != "independent":
         problems.append(
             "Arguments `plants` and `draws` have no place here: the design draws the plants."
@@ -129,8 +134,8 @@ def make_engine(plan: Plan, design: Design, reporter: Reporter) -> LaneEngine:
     d = len(design.factors)
     reporter.notice(
         f"Seed {plan.config.seed}; N = {design.samples} base samples x (d + 2) = {d + 2} rows = "
-        f"{design.rows} runs of each of {len(plan.controllers)} controller(s) on {count} "
-        f"{devices[0].platform} device(s), about "
+        f"{design.rows} runs of {counted(len(plan.controllers), 'controller')} each on "
+        f"{counted(count, f'{devices[0].platform} device')}, about "
         f"{2 * chunk * lane_bytes(samples, plan.noise.channels) / GB:.2g} GB."
     )
     for text in plan.notices:

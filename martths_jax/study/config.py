@@ -10,11 +10,14 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from martths_jax.controllers import Controller
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import DEFAULT_SCALE, Motion
 from martths_jax.sensors import SensorNoise
 from martths_jax.study.fields import BY_NAME, FIELDS, SECTIONS
+from martths_jax.text import shortened
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ class StudyConfig:
     def problems(self) -> list[str]:
         """Sentences about settings that cannot be used, without loading or building anything."""
         found = [
-            str(argument_error(f.name, f.wanted, repr(getattr(self, f.name))))
+            str(argument_error(f.name, f.wanted, shortened(getattr(self, f.name))))
             for f in FIELDS
             if not f.good(getattr(self, f.name))
         ]
@@ -105,6 +108,8 @@ def make_config(given=None, **changes) -> StudyConfig:
 def _plain(value):
     if isinstance(value, list):
         return tuple(value)
+    if isinstance(value, np.generic):
+        return value.item()
     return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
@@ -139,7 +144,9 @@ def read_toml(path: Path) -> dict:
             f"Configuration {path} cannot be read ({error.strerror}); `martths init-config` "
             "writes one to start from."
         ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except RecursionError:
+        raise InputError(f"Configuration {path} nests its brackets too deeply.") from None
+    except ValueError as error:  # of TOML, of its encoding, or a number beyond all bounds
         raise InputError(f"Configuration {path} is not valid TOML: {error}.") from None
     settings: dict = {}
     problems = unknown_names(sorted(set(document) - {*SECTIONS, "controller"}),

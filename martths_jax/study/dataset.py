@@ -1,7 +1,8 @@
 """The result file: one NetCDF-4 file that xarray, MATLAB's ``ncread`` and plain HDF5 tools read.
 
 Text is stored as fixed-length characters and attributes as fixed-length text, since older readers
-know neither variable-length strings nor booleans.  Nothing in the file depends on when, in how many
+know neither variable-length strings nor booleans.  Both are marked as UTF-8: whoever knows the mark
+(xarray, netCDF4) gives text and not bytes.  Nothing in the file depends on when, in how many
 sessions or on how many devices it was computed: that is in ``provenance.json``.
 """
 
@@ -10,10 +11,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import h5netcdf
+import h5py
 import numpy as np
 import xarray as xr
 
 from martths_jax.errors import InputError
+from martths_jax.files import forgiving
 from martths_jax.indices import NAMES
 from martths_jax.plant import PARAMETERS, Plants
 from martths_jax.study.checksum import CHECKSUM, content_digest
@@ -29,6 +33,8 @@ STATUS_FLAGS = {
     "flag_values": np.array([int(s) for s in Status], dtype=np.int32),
     "flag_meanings": " ".join(s.name.lower() for s in Status),
 }
+#: What says that characters are text, by the conventions of NetCDF.
+ENCODING = {"_Encoding": "utf-8"}
 #: Longest attribute HDF5 stores in an object's header [bytes].
 LONGEST_ATTRIBUTE = 60_000
 _FIRST_WORDS = {
@@ -139,22 +145,27 @@ def write_dataset(dataset: xr.Dataset, path: Path, group: str | None = None) -> 
     stored = dataset.copy()
     stored.attrs[CHECKSUM] = content_digest(dataset)
     for name, variable in stored.variables.items():
+        attrs = variable.attrs
         if variable.dtype.kind == "U":
-            variable = xr.Variable(
-                variable.dims, np.char.encode(variable.values, "utf-8"), variable.attrs
-            )
+            text = np.char.encode(variable.values, "utf-8")
+            variable, attrs = xr.Variable(variable.dims, text), attrs | ENCODING
         variable = variable.copy()
-        variable.attrs = {k: _fixed(v) for k, v in variable.attrs.items()}
+        variable.attrs = {k: _fixed(v) for k, v in attrs.items()}
         stored[name] = variable
     stored.attrs = {k: _fixed(v) for k, v in stored.attrs.items()}
     # No fill value beside NaN itself: nothing is missing, and a NaN is a trial that diverged.
     plain = {name: {"_FillValue": None} for name in stored.variables}
-    stored.to_netcdf(path, mode="a" if group else "w", engine="h5netcdf", group=group,
-                     encoding=plain)  # fmt: skip
+    with forgiving(path, "r+b" if group else "w+b") as file:
+        with h5netcdf.File(file, "a" if group else "w") as root:
+            store = xr.backends.H5NetCDFStore(root, group, mode="a")
+            stored.dump_to_store(store, encoding=plain)
 
 
 def _fixed(value):
-    return np.bytes_(value.encode()) if isinstance(value, str) else value
+    if not isinstance(value, str):
+        return value
+    content = value.encode()
+    return np.array(content, dtype=h5py.string_dtype("utf-8", max(len(content), 1)))
 
 
 def save_dataset(dataset: xr.Dataset, path: Path) -> None:
@@ -191,13 +202,11 @@ def read_dataset(path: Path, group: str | None = None) -> xr.Dataset:
     except Exception as error:  # a damaged file makes HDF5 and its readers raise nearly anything
         why = str(error).splitlines()[0][:120] if str(error) else repr(error)
         raise _damaged(path, why) from None
-    dataset.attrs = {k: v.decode() if isinstance(v, bytes) else v for k, v in dataset.attrs.items()}
     for name, variable in dataset.variables.items():
-        variable.attrs = {
-            k: v.decode() if isinstance(v, bytes) else v for k, v in variable.attrs.items()
-        }
-        if variable.dtype.kind == "S":
-            text = np.char.decode(variable.values, "utf-8")
+        # Characters come as text, and as bytes from files that do not say their encoding.
+        if variable.dtype.kind in "SO":
+            text = variable.values
+            text = np.char.decode(text, "utf-8") if text.dtype.kind == "S" else text.astype(str)
             dataset[name] = (variable.dims, text, variable.attrs)
     found = dataset.attrs.get("format", FORMAT if group else None)
     if found is None or int(np.ravel(found)[0]) != FORMAT:

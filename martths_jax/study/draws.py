@@ -16,14 +16,17 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import norm, qmc
 
-from martths_jax.errors import InputError
+from martths_jax.errors import InputError, argument_error
 from martths_jax.plant import HZ, NOMINAL_HZ, PARAMETERS, SIGMA, Plants, draw_plants
 from martths_jax.plant import plant_from_draws as check_draws
+from martths_jax.resources import available_memory
 from martths_jax.study.files import writing
 
 #: Trials that are drawn together.  Always the same number at the same place, so that the bits of a
 #: draw do not depend on how many are asked for.
 BLOCK = 128
+#: Points of scipy's Sobol' sequence, and memory that making an even draw takes [bytes].
+MOST_SOBOL, EVEN_BYTES = 2**30, 4 * 9 * 8
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,17 @@ def make_draws(config) -> Draws:
 
 
 def even_draws(kind: str, trials: int, seed: int) -> np.ndarray:
-    """(trials, 9) standard normal draws from a Latin hypercube or scrambled Sobol' sequence."""
+    """(trials, 9) standard normal draws from a Latin hypercube or scrambled Sobol' sequence.
+
+    Raises:
+        InputError: more trials than there are points, or than fit into memory.
+    """
+    most = int(min(available_memory() / EVEN_BYTES, MOST_SOBOL if kind == "sobol" else np.inf))
+    if trials > most:
+        raise argument_error(
+            "trials", f"be at most {most} with {kind} draws, which are made all at once", trials,
+            "Use independent draws.",
+        )  # fmt: skip
     make = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[kind]
     with warnings.catch_warnings():
         # Sobol' balance wants a power of two; any number is allowed here and documented.

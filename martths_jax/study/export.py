@@ -13,6 +13,7 @@ from martths_jax.errors import InputError
 from martths_jax.plant import Plants
 from martths_jax.study.draws import write_plants
 from martths_jax.study.files import writing
+from martths_jax.text import csv_field
 from martths_jax.watch import Status
 
 
@@ -29,17 +30,13 @@ def write_csv(dataset: xr.Dataset, path: Path) -> None:
         for controller in dataset.controller.values:
             for motion in dataset.motion.values:
                 cell = dataset.sel(controller=controller, motion=motion)
-                start = f"{_quoted(controller)},{_quoted(motion)}"
+                start = f"{csv_field(controller)},{csv_field(motion)}"
                 numbers = np.hstack([cell.value.values, cell.volt_peak.values]).tolist()
                 for trial, status, row in zip(
                     cell.trial.values, cell.status.values, numbers, strict=True
                 ):
                     cells = ",".join("" if x != x else repr(x) for x in row)
                     file.write(f"{start},{trial},{words[int(status)]},{cells}\n")
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\n') else str(text)
 
 
 def write_mat(dataset: xr.Dataset, path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +11,9 @@ from martths_jax.benchmark import PARTITIONS
 from martths_jax.structure.integrators import INTEGRATORS
 
 DRAWS = ("independent", "lhs", "sobol")
+#: Trials are numbered in 32 bits; the larger half of the numbers is for the noise of sensitivity
+#: analyses.
+MOST_TRIALS = 2**30 - 1
 CSV_KINDS = ("auto", "draws", "hz", "rad/s")
 
 
@@ -33,14 +36,15 @@ class Field:
     help: str
 
 
-def is_whole(value, low: int = 0) -> bool:
-    """Whether `value` is a whole number (not a bool) of at least `low`."""
-    return isinstance(value, int) and not isinstance(value, bool) and value >= low
+def is_whole(value, low: int = 0, high: int = MOST_TRIALS) -> bool:
+    """Whether `value` is a whole number (not a bool) from `low` to `high`."""
+    return isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
 
 
 def is_number(value) -> bool:
     """Whether `value` is a finite number (not a bool)."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    good = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return good and abs(value) <= sys.float_info.max  # an integer may be beyond any float
 
 
 def is_positive(value) -> bool:
@@ -74,9 +78,11 @@ _bool = lambda value: isinstance(value, bool)  # noqa: E731
 _choice = lambda names: f"be one of {', '.join(names)}"  # noqa: E731
 
 FIELDS = (
-    Field("trials", "study", lambda v: is_whole(v, 1), "be a whole number of at least 1",
+    Field("trials", "study", lambda v: is_whole(v, 1),
+          f"be a whole number from 1 to {MOST_TRIALS}",
           "Number of uncertain plants; the nominal plant runs beside them as trial 0."),
-    Field("seed", "study", lambda v: is_whole(v) and v < 2**63, "be a whole number from 0 to 2^63",
+    Field("seed", "study", lambda v: is_whole(v, 0, 2**63 - 1),
+          "be a whole number from 0 to 2^63 - 1",
           "Plant and sensor noise of trial i depend on (seed, i) alone."),
     Field("controllers", "study", _is_list, "be a list of at least one controller",
           "Controllers to compare: lqg, adfc, passthrough or names of [controller.NAME] tables."),

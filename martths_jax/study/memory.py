@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import psutil
-
 from martths_jax.errors import InputError
+from martths_jax.resources import available_memory
 from martths_jax.simulation import room_for
 
 GB = 1e9
@@ -12,6 +11,9 @@ GB = 1e9
 MOST_BLOCKS = 16
 #: Noise as kept for the chunk, and once more for what exists while a block is drawn.
 COPIES = 2
+#: Memory of a trial's results under a controller and motion as they are put together [bytes]: 24
+#: indices, first samples and peaks as numbers, and once more as they are stacked.
+RESULT_BYTES = 2 * 8 * 36
 #: A chunk's noise is kept below this, however much memory is free [bytes].
 ENOUGH = 0.5e9
 
@@ -19,6 +21,24 @@ ENOUGH = 0.5e9
 def lane_bytes(samples: int, channels: int) -> int:
     """Memory that one trial of a chunk takes [bytes]: its noise, the rest is small."""
     return 8 * room_for(samples) * channels * COPIES
+
+
+def check_results(trials: int, cells: int) -> None:
+    """Refuse a study whose results would not fit, since they are put together in memory.
+
+    Args:
+        trials: number of trials.
+        cells: controllers times motions.
+
+    Raises:
+        InputError: if they are larger than the memory that is free.
+    """
+    need, free = RESULT_BYTES * trials * cells, available_memory()
+    if need > free:
+        raise InputError(
+            f"Results of {trials} trials take {need / GB:.3g} GB, but {free / GB:.2g} GB are free; "
+            "run fewer trials, or shares of them here and the whole on a larger machine."
+        )
 
 
 def choose_chunk(
@@ -37,7 +57,7 @@ def choose_chunk(
     Raises:
         InputError: if not even one device's trials fit.
     """
-    free = psutil.virtual_memory().available
+    free = available_memory()
     bound = memory_gb * GB if memory_gb else min(free / 4, ENOUGH)
     each = lane_bytes(samples, channels) * lanes
     # One block a device is the least there is; then it may take half of what is free.

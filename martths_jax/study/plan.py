@@ -12,6 +12,7 @@ import numpy as np
 from martths_jax.benchmark import Benchmark, build_benchmark
 from martths_jax.controllers import ADFC, LQG, Controller, Passthrough
 from martths_jax.errors import InputError, raise_all
+from martths_jax.files import name_problems
 from martths_jax.motions import BUILTIN_NAMES, Motion, load_motion
 from martths_jax.motions.catalogue import BENCHMARK_NAMES, record_files
 from martths_jax.sensors import SensorNoise
@@ -98,6 +99,7 @@ def build_plan(config: StudyConfig) -> Plan:
     names = [m.name for m in motions if m is not None]
     for name in sorted({n for n in names if names.count(n) > 1}):
         problems.append(f"Two motions are called {name!r}; rename one of the files.")
+    problems += name_problems("motion", names) + name_problems("controller", list(controllers))
     raise_all(problems, "The study cannot be run")
     noise = SensorNoise(config.noise_power, config.noise_shared, config.seed)
     return Plan(config, benchmark, controllers, tuple(motions), noise, draws, settings)

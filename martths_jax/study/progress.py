@@ -9,8 +9,13 @@ import jax.monitoring
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Column
+
+from martths_jax.text import counted
 
 _COMPILE_PREFIX = "/jax/core/compile/"
+#: Terminals from this width on have room for bars beside the words.
+WIDE = 110
 _compile_seconds = 0.0
 
 
@@ -103,7 +108,7 @@ class Lines(Reporter):
             return
         self.last[cell] = now
         self.notice(
-            f"{cell[0]} on {cell[1]}: {tally.done} of {tally.total} trials, "
+            f"{cell[0]} on {cell[1]}: {tally.done} of {counted(tally.total, 'trial')}, "
             f"{tally.rate:.0f} trials/s, {_clock(self.eta(tally))} to go, {tally.failed} failed, "
             f"compiled in {tally.compiling:.1f} s"
         )
@@ -115,10 +120,10 @@ class Bars(Reporter):
     def __init__(self, console: Console):
         self.console = console
         self.progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=24),
+            TextColumn("{task.description}", table_column=Column(overflow="fold")),
+            *([BarColumn(bar_width=24)] if console.width >= WIDE else []),
             MofNCompleteColumn(),
-            TextColumn("{task.fields[state]}"),
+            TextColumn("{task.fields[state]}", table_column=Column(overflow="fold")),
             console=console,
         )
 

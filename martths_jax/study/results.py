@@ -12,6 +12,7 @@ from martths_jax.errors import InputError
 from martths_jax.study.dataset import read_dataset, read_results
 from martths_jax.study.signals import group
 from martths_jax.study.summary import Summary, summarise
+from martths_jax.text import counted
 from martths_jax.watch import Status
 
 
@@ -62,8 +63,9 @@ class Study:
     def __str__(self) -> str:
         sizes = self.dataset.sizes
         return (
-            f"Study in {self.folder}: {sizes['controller']} controllers, {sizes['motion']} "
-            f"motions, {sizes['trial'] - 1} trials, {self.failed} runs failed"
+            f"Study in {self.folder}: {counted(sizes['controller'], 'controller')}, "
+            f"{counted(sizes['motion'], 'motion')}, {counted(sizes['trial'] - 1, 'trial')}, "
+            f"{counted(self.failed, 'run')} failed"
         )
 
 

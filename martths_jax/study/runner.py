@@ -23,7 +23,7 @@ from martths_jax.study.engine import Engine, choose_devices
 from martths_jax.study.export import write_csv
 from martths_jax.study.files import disk_errors, set_aside, write_text
 from martths_jax.study.machine import machine_digest, machine_identity
-from martths_jax.study.memory import GB, choose_chunk, lane_bytes
+from martths_jax.study.memory import GB, check_results, choose_chunk, lane_bytes
 from martths_jax.study.owner import door
 from martths_jax.study.plan import Plan, build_plan
 from martths_jax.study.progress import Reporter, Tally, compile_seconds
@@ -32,6 +32,7 @@ from martths_jax.study.signals import store_signals
 from martths_jax.study.store import RunFolder
 from martths_jax.study.summary import summarise
 from martths_jax.study.template import write_config
+from martths_jax.text import counted
 from martths_jax.watch import Status
 
 
@@ -75,6 +76,8 @@ def run_study(
             "another has just stored; remove the folder first, or choose another --out."
         )
     plan = build_plan(config)
+    if share is None:
+        check_results(plan.trials + 1, len(plan.controllers) * len(plan.motions))
     reporter = reporter or Reporter()
     with RunFolder.start(
         Path(config.out), header(plan, command_line), fresh, shared=share is not None,
@@ -129,8 +132,9 @@ def make_engine(plan: Plan, reporter: Reporter) -> Engine:
     engine = Engine(plan, devices[:count], chunk)
     size = chunk * lane_bytes(samples, plan.noise.channels)
     reporter.notice(
-        f"Seed {plan.config.seed}; {plan.trials} trials and the nominal plant on {count} "
-        f"{devices[0].platform} device(s), in chunks of {chunk} trials (about {size / GB:.2g} GB)."
+        f"Seed {plan.config.seed}; {counted(plan.trials, 'trial')} and the nominal plant on "
+        f"{counted(count, f'{devices[0].platform} device')}, in chunks of {chunk} trials "
+        f"(about {size / GB:.2g} GB)."
     )
     for text in plan.notices:
         reporter.notice(text)

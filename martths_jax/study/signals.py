@@ -12,12 +12,12 @@ import hashlib
 import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from urllib.parse import quote
 
 import numpy as np
 import xarray as xr
 
 from martths_jax.errors import InputError
+from martths_jax.files import safe_name
 from martths_jax.indices import NAMES
 from martths_jax.simulation import FEW
 from martths_jax.study.dataset import read_dataset, write_dataset
@@ -112,7 +112,7 @@ def store_signals(
 
 def group(motion: str, controller: str | None = None) -> str:
     """Name of the group that holds the signals of a motion, or of a controller on it."""
-    return "/" + "/".join(quote(n, safe=" ") for n in (motion, controller) if n is not None)
+    return "/" + "/".join(safe_name(n) for n in (motion, controller) if n is not None)
 
 
 def _is_whole(path: Path, label: str, chosen) -> bool:

@@ -35,6 +35,7 @@ from martths_jax.study.machine import MIXED_NOTE
 from martths_jax.study.owner import Owner, door
 from martths_jax.study.parts import Damaged, read_part
 from martths_jax.study.stored import Stored
+from martths_jax.text import counted
 
 #: Version of the layout of the result files.
 FORMAT = 1
@@ -165,9 +166,9 @@ class RunFolder(Stored):
             )
         if asked["trials"] < self.header["trials"]:
             raise InputError(
-                f"{self.path} holds a {self.what} of {self.header['trials']} trials, but "
-                f"{asked['trials']} were asked for; a {self.what} can be extended, not shortened.  "
-                f"{_AGAIN}"
+                f"{self.path} holds a {self.what} of {counted(self.header['trials'], 'trial')}, "
+                f"but {asked['trials']} were asked for; a {self.what} can be extended, not "
+                f"shortened.  {_AGAIN}"
             )
         changed = dict(self.header)
         changed["machines"] = self._machines(asked["machines"], allow_mixed, notice)

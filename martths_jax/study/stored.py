@@ -52,7 +52,7 @@ class Stored:
 
     def folder(self, controller: str, motion: str) -> Path:
         """Where the parts of a controller and motion are."""
-        return self.path / "parts" / safe_name(controller) / safe_name(motion)
+        return self.path / "parts" / safe_name(controller, space=False) / safe_name(motion)
 
     def parts(self, controller: str, motion: str) -> Iterator[tuple[int, int, Path]]:
         """(first trial, last trial, path) of every part, by first trial."""

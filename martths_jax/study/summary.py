@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from rich.box import SIMPLE
-from rich.markup import escape
-from rich.table import Table as RichTable
 
 from martths_jax import published
 from martths_jax.indices import NAMES
+from martths_jax.screen import ScreenTable
 from martths_jax.study.statistics import LEVEL, PERCENTS, Estimate, compare, percentile
+from martths_jax.text import counted, markdown_text
 from martths_jax.watch import Status
 
 #: The paper's comparison: this controller against that one.
@@ -26,7 +25,9 @@ class Table:
     Attributes:
         title: what it shows; notes: sentences below it.
         columns: heads; rows: cells.
-        aside: columns that a narrow terminal has no room for.
+        aside: columns that a terminal has no room for.
+        keys: number of columns that say what a row is.
+        text: columns of text, which may be folded.
     """
 
     title: str
@@ -34,30 +35,24 @@ class Table:
     rows: list[tuple[str, ...]]
     notes: tuple[str, ...] = ()
     aside: tuple[str, ...] = ()
+    keys: int = 1
+    text: tuple[str, ...] = ()
 
     def markdown(self) -> str:
         """The table in Markdown."""
-        line = lambda cells: "| " + " | ".join(cells) + " |"  # noqa: E731
+        line = lambda cells: f"| {' | '.join(markdown_text(c, cell=True) for c in cells)} |"  # noqa: E731
         rule = line(["---", *["---:"] * (len(self.columns) - 1)])
         body = "\n".join([line(self.columns), rule, *map(line, self.rows)])
-        return "\n\n".join([f"## {self.title}", body, *self.notes]) + "\n"
+        title, notes = f"## {markdown_text(self.title)}", map(markdown_text, self.notes)
+        return "\n\n".join([title, body, *notes]) + "\n"
 
-    def __rich__(self) -> RichTable:
-        table = RichTable(
-            title=escape(self.title),
-            caption=escape(" ".join(self.notes)) or None,
-            box=SIMPLE,
-            padding=(0, 1, 0, 0),
-            show_edge=False,
-        )
+    def __rich__(self) -> ScreenTable:
         shown = [i for i, column in enumerate(self.columns) if column not in self.aside]
-        for i in shown:
-            table.add_column(
-                escape(self.columns[i]), justify="right" if i else "left", overflow="fold"
-            )
-        for row in self.rows:
-            table.add_row(*(escape(row[i]) for i in shown))
-        return table
+        pick = lambda cells: tuple(cells[i] for i in shown)  # noqa: E731
+        rows = [pick(row) for row in self.rows]
+        return ScreenTable(
+            self.title, pick(self.columns), rows, self.notes, keys=self.keys, text=self.text
+        )
 
 
 @dataclass(frozen=True)
@@ -69,7 +64,8 @@ class Summary:
 
     def markdown(self) -> str:
         """The whole summary in Markdown."""
-        return "\n".join([f"# {self.heading}\n", *(t.markdown() for t in self.tables)])
+        heading = f"# {markdown_text(self.heading)}\n"
+        return "\n".join([heading, *(table.markdown() for table in self.tables)])
 
     __str__ = markdown
 
@@ -87,15 +83,11 @@ def summarise(dataset: xr.Dataset) -> Summary:
 
 def extent(dataset: xr.Dataset) -> str:
     """How much was run, in words."""
-
-    def counted(dimension: str, noun: str) -> str:
-        number = dataset.sizes[dimension]
-        return f"{number} {noun}{'' if number == 1 else 's'}"
-
-    plants = dataset.sizes["trial"] - 1  # trial 0 is the nominal plant
+    sizes = dataset.sizes
     return (
-        f"{plants} uncertain plant{'' if plants == 1 else 's'}, {counted('motion', 'motion')}, "
-        f"{counted('controller', 'controller')}, seed {dataset.attrs['seed']}"
+        f"{counted(sizes['trial'] - 1, 'uncertain plant')}, "  # trial 0 is the nominal plant
+        f"{counted(sizes['motion'], 'motion')}, {counted(sizes['controller'], 'controller')}, "
+        f"seed {dataset.attrs['seed']}"
     )
 
 
@@ -119,7 +111,8 @@ def _ends(dataset, cells) -> Table:
         counts = [str(int(np.sum(status == s))) for s in Status]
         rows.append((controller, motion, str(status.size), *counts, number(peak)))
     heads = ("controller", "motion", "trials", *(s.name.lower() for s in Status), "peak [V]")
-    return Table("How the uncertain trials ended", heads, rows)
+    names = ("controller", "motion")
+    return Table("How the uncertain trials ended", heads, rows, keys=2, text=names)
 
 
 def _percentiles(dataset, controller: str, motion: str) -> Table:
@@ -134,7 +127,8 @@ def _percentiles(dataset, controller: str, motion: str) -> Table:
         ))  # fmt: skip
     heads = ("index", *(f"P{p}" for p in PERCENTS), "trials", "nominal")
     note = f"In brackets: {LEVEL:.0%} bootstrap confidence intervals."
-    title = f"{controller} on {motion}: {rows[0][-2]} of {len(value) - 1} trials"
+    whole = int(np.sum(np.all(np.isfinite(value[1:]), axis=1)))
+    title = f"{controller} on {motion}: {whole} of {counted(len(value) - 1, 'trial')}"
     return Table(title, heads, rows, (note,), aside=("trials", "nominal"))
 
 

@@ -20,6 +20,7 @@ from martths_jax.figures.style import (
     new_figure,
     save,
 )
+from martths_jax.files import safe_name
 from martths_jax.indices import DELAYS
 from martths_jax.study.statistics import LEVEL, percentile, proportion
 from martths_jax.sweep.axes import OVERLAPS, Axis
@@ -53,7 +54,8 @@ def drawings(sweep: Sweep, shown: Sequence[str]) -> Iterator[tuple[str, Drawing]
     with house_style():
         for motion in sweep.dataset.motion.values:
             if len(moving) == 1:
-                yield f"lines_{moving[0].name}_{motion}", lines(sweep, moving[0], motion, shown)
+                name = f"lines_{moving[0].name}_{safe_name(motion)}"
+                yield name, lines(sweep, moving[0], motion, shown)
                 continue
             pair = map_axes(moving)
             others = [axis for axis in sweep.axes if axis not in pair]
@@ -63,7 +65,8 @@ def drawings(sweep: Sweep, shown: Sequence[str]) -> Iterator[tuple[str, Drawing]
                     tail = "".join(
                         f"_{a.name}={a.text(fixed[a.name])}" for a in others if len(a.values) > 1
                     )
-                    head = f"map_{pair[0].name}_{pair[1].name}_{controller}_{motion}"
+                    names = f"{safe_name(controller)}_{safe_name(motion)}"
+                    head = f"map_{pair[0].name}_{pair[1].name}_{names}"
                     drawing = heat_map(sweep, pair, str(controller), str(motion), fixed, shown)
                     yield head + tail, drawing
 

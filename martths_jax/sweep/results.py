@@ -20,7 +20,6 @@ from martths_jax.study.dataset import (
     save_dataset,
 )
 from martths_jax.study.engine import FIRSTS
-from martths_jax.study.export import _quoted
 from martths_jax.study.files import write_text, writing
 from martths_jax.study.statistics import percentile
 from martths_jax.study.store import RunFolder
@@ -28,6 +27,7 @@ from martths_jax.study.summary import Summary, Table, extent, number
 from martths_jax.sweep.axes import SCALARS, Axis
 from martths_jax.sweep.config import SHOWN, SweepConfig
 from martths_jax.sweep.grid import cell_numbers
+from martths_jax.text import counted, csv_field
 from martths_jax.watch import Status
 
 _CELL_WORDS = {
@@ -89,7 +89,7 @@ class Sweep:
 
     def __str__(self) -> str:
         sizes = " x ".join(f"{axis.name} {len(axis.values)}" for axis in self.axes)
-        return f"Sweep in {self.folder}: {sizes}, {self.lost} runs lost"
+        return f"Sweep in {self.folder}: {sizes}, {counted(self.lost, 'run')} lost"
 
 
 def open_sweep(folder: str | Path) -> Sweep:
@@ -187,7 +187,7 @@ def write_csv(sweep: Sweep, path: Path) -> None:
         for place in np.ndindex(*data.value.shape[:-2]):
             values = [repr(a.values[i]) for a, i in zip(axes, place, strict=False)]
             names = [str(data.controller.values[place[-2]]), str(data.motion.values[place[-1]])]
-            start = ",".join([*values, *map(_quoted, names)])
+            start = ",".join([*values, *map(csv_field, names)])
             for trial, status, held, row in zip(
                 data.trial.values, data.status.values[place], data.held.values[place],
                 data.value.values[place].tolist(), strict=True,
@@ -216,6 +216,6 @@ def summarise(sweep: Sweep, shown: tuple[str, ...]) -> Summary:
                 rows.append((*where, f"{100 * float(lost[at]):.1f}", *pairs))
             heads = (*(a.name for a in axes), "lost [%]", *shown)
             note = "Median / 95th percentile over the uncertain trials that finished."
-            tables.append(Table(f"{controller} on {motion}", heads, rows, (note,)))
+            tables.append(Table(f"{controller} on {motion}", heads, rows, (note,), keys=len(axes)))
     sizes = " x ".join(f"{len(a.values)} {a.name}" for a in axes)
     return Summary(f"Sweep of {sizes}: {extent(data)}", tables)

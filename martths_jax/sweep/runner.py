@@ -24,6 +24,7 @@ from martths_jax.sweep.grid import Job, job_config
 from martths_jax.sweep.lanes import LaneEngine, Worlds
 from martths_jax.sweep.results import Sweep, write_results
 from martths_jax.sweep.store import SweepFolder, sweep_identity
+from martths_jax.text import counted
 from martths_jax.watch import Status
 
 #: Trials that are run together in every cell of a batch, so that their noise is drawn once.  The
@@ -152,15 +153,16 @@ def make_engine(base: Plan, worlds: Worlds, sweep: SweepConfig, reporter: Report
     batches = sweep.grid.batches()
     runs = sum(map(len, batches)) * len(base.motions) * (base.trials + 1)
     reporter.notice(
-        f"Seed {base.config.seed}; {len(sweep.grid.places)} cells, {runs} runs on {count} "
-        f"{devices[0].platform} device(s), {len(batches)} batch(es) of cells a motion, about "
+        f"Seed {base.config.seed}; {counted(len(sweep.grid.places), 'cell')}, "
+        f"{runs} runs on {counted(count, f'{devices[0].platform} device')}, "
+        f"{counted(len(batches), 'batch', 'batches')} of cells a motion, about "
         f"{engine.chunk * lane_bytes(samples, channels) / GB:.2g} GB."
     )
     for controller, jobs in sweep.grid.jobs.items():
         if len(set(jobs)) < len(jobs):
             reporter.notice(
-                f"{controller} has not all of the axes: {len(set(jobs))} of its {len(jobs)} cells "
-                "are distinct, and each is run once."
+                f"{controller} has not all of the axes: its {len(jobs)} cells make "
+                f"{counted(len(set(jobs)), 'distinct one')}, and each is run once."
             )
     for text in base.notices:
         reporter.notice(text)

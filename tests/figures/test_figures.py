@@ -23,7 +23,7 @@ from martths_jax.structure.sections import FrameGeometry
 from tests.figures.small_study import MOTIONS, TRIALS
 
 NAMES = {
-    "fig08_strokes_elcentro-like", f"strokes_{MOTIONS[1]}", "fig11_coefficients",
+    "fig08_strokes_elcentro-like", "strokes_short %26 %3Cquick%3E", "fig11_coefficients",
     "fig12_synchronisation_actuators", "fig13_synchronisation_interface", "fig14a_controllers",
     "fig14b_motions", "fig14b_motions_lqg", "fig15_histograms", "paired", "ecdf", "bode", "delay",
     "frame",

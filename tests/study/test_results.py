@@ -3,10 +3,13 @@
 import csv
 import json
 import re
+import shutil
 
 import h5py
+import jax
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.io import loadmat
 from typer.testing import CliRunner
 
@@ -15,9 +18,13 @@ from martths_jax.cli import app
 from martths_jax.indices import NAMES
 from martths_jax.study import memory as memory_module
 from martths_jax.study import run_study
+from martths_jax.study.dataset import read_dataset, write_dataset
 from martths_jax.study.export import write_mat
+from martths_jax.study.files import writing
 from martths_jax.study.memory import choose_chunk, lane_bytes
 from martths_jax.study.progress import Lines, Tally
+from martths_jax.study.signals import group
+from martths_jax.study.store import FORMAT
 from tests.study.places import SAMPLES, short_motion, small
 
 
@@ -52,6 +59,38 @@ def test_the_file_needs_no_xarray(study):
                  "git_commit", "command_line", "record_sha256"):  # fmt: skip
         assert attributes[name]
     assert attributes["seed"] == 1 and b"one one-sha" in attributes["record_sha256"]
+
+
+def test_plain_xarray_gives_text(study, tmp_path):
+    with xr.open_dataset(study.folder / "study.nc", engine="h5netcdf") as file:
+        at = {"controller": "passthrough", "motion": "größer", "index": "J2_1"}
+        assert np.array_equal(file.value.sel(at), study.dataset.value.sel(at))
+        assert file.attrs["version_jax"] == jax.__version__
+        assert file.pga.attrs["units"] == "m s-2" and file.held.attrs["units"] == "1"
+    # A group, with text along a dimension that has no coordinate, and attributes beyond ASCII.
+    roles = xr.Dataset({"role": ("kept", np.array(["nominal", "median+kept"]), {"note": "é"})})
+    with writing(tmp_path / "signals.nc") as path:
+        write_dataset(xr.Dataset(attrs={"format": FORMAT, "name": "größer", "none": ""}), path)
+        write_dataset(roles, path, group("größer", "lqg"))
+    with xr.open_dataset(tmp_path / "signals.nc", engine="h5netcdf") as file:
+        assert file.attrs["name"] == "größer" and file.attrs["none"] == ""
+    inside = group("größer", "lqg")
+    with xr.open_dataset(tmp_path / "signals.nc", group=inside, engine="h5netcdf") as file:
+        assert list(file.role.values) == ["nominal", "median+kept"]
+        assert file.role.attrs["note"] == "é"
+
+
+def test_a_file_without_the_mark_of_text_is_read_alike(study, tmp_path):
+    shutil.copy(study.folder / "study.nc", tmp_path / "study.nc")
+    with h5py.File(tmp_path / "study.nc", "r+") as file:
+        marked = [item for item in file.values() if "_Encoding" in item.attrs]
+        assert len(marked) == 6
+        for item in marked:
+            assert item.attrs["_Encoding"] == b"utf-8"
+            del item.attrs["_Encoding"]
+    again = read_dataset(tmp_path / "study.nc")
+    xr.testing.assert_identical(again, read_dataset(study.folder / "study.nc"))
+    assert again.motion.dtype.kind == "U" and list(again.motion.values) == ["one", "größer"]
 
 
 def test_the_matlab_file_holds_the_same(study, tmp_path):
@@ -136,8 +175,7 @@ def test_what_a_command_refuses(words, message):
 
 def test_the_chunk_follows_the_memory(monkeypatch):
     free = {"available": 20e9}
-    memory = type("M", (), {"available": property(lambda _: free["available"])})()
-    monkeypatch.setattr(memory_module.psutil, "virtual_memory", lambda: memory)
+    monkeypatch.setattr(memory_module, "available_memory", lambda: free["available"])
     each = lane_bytes(52_162, 1)
     devices, chunk = choose_chunk(52_162, 1, 128, 2)
     assert devices == 2 and chunk == 256 and chunk * each <= 0.5e9
