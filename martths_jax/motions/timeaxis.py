@@ -10,12 +10,16 @@ from ..errors import InputError
 #: passed over whatever the digits are: far below one missing or doubled sample.
 TIME_TOLERANCE = 0.02
 
-#: The same for times rounded to few decimals.  One missing sample moves others by half a step.
-ROUNDED_TOLERANCE = 0.4
+#: The coarsest last digit that times may be rounded to, as a fraction of the step.  Steps then
+#: differ by less than half a step from each other; at a missing or doubled sample by more.
+ROUNDED_TOLERANCE = 0.49
 
 #: Decimals that times may be rounded to, and how far (relative) a step may be off for that.
 _DECIMALS = range(7)
 _LOOSE = 1e-3
+
+#: Whole rates that are tried.
+_RATES = 200
 
 
 def uniform_step(
@@ -47,11 +51,12 @@ def uniform_step(
             f"{where}: its times have too few decimals ({_count(unit)}) for a step near {step:.3g} "
             "s; give the time step in `dt` (--dt 0.001), or print more decimals."
         )
-    allowed = max(TIME_TOLERANCE * step, min(1.001 * unit, ROUNDED_TOLERANCE * step))
+    rounding = 1.001 * unit if unit <= ROUNDED_TOLERANCE * step else 0.0
+    allowed = max(TIME_TOLERANCE * step, rounding)
     _refuse_uneven(time, step, departure, allowed, where, lines)
     if exact:
         return step, ()
-    return _snapped(step, unit / (time.size - 1), where)
+    return _snapped(time, step, unit, where)
 
 
 def is_time(values: np.ndarray) -> bool:
@@ -70,10 +75,13 @@ def _refuse_uneven(time, step, departure, allowed, where, lines) -> None:
         steps = np.diff(time)
         if not bad.size:
             bad = np.flatnonzero(~(steps > 0)) + 1
+        uneven = np.abs(steps - step) > 2 * TIME_TOLERANCE * step
         if not bad.size and np.max(departure) > allowed:
             typical = np.median(steps)
             bad = np.flatnonzero(np.abs(steps - typical) > max(allowed, 0.02 * typical)) + 1
             bad = bad if bad.size else np.array([int(np.argmax(departure))])
+        elif not bad.size and np.any(uneven):
+            bad = np.flatnonzero(np.abs(steps - step) > allowed + allowed / steps.size) + 1
     if bad.size or not (np.isfinite(step) and step > 0):
         first = int(bad[0]) if bad.size else 0
         place = f"line {lines[first]}" if lines else f"sample {first + 1}"
@@ -106,12 +114,17 @@ def _fits(time: np.ndarray, dt: float, unit: float) -> bool:
     return bool(np.max(np.abs(away)) <= 1.001 * unit and np.ptp(away) <= 1.001 * unit)
 
 
-def _snapped(step: float, doubt: float, where: str) -> tuple[float, tuple[str, ...]]:
-    """`step` [s], or 1/f for the one whole rate f [Hz] that is within `doubt` [s] of it."""
+def _snapped(
+    time: np.ndarray, step: float, unit: float, where: str
+) -> tuple[float, tuple[str, ...]]:
+    """`step` [s], or 1/f for the one whole rate f [Hz] whose times round to these."""
+    doubt = unit / (time.size - 1)
     first = np.ceil(1 / (step + doubt))
     last = np.floor(1 / (step - doubt)) if step > doubt else np.inf
-    if doubt > 0 and first == last:
-        return float(1 / first), ()
+    if doubt > 0 and last - first < _RATES:
+        fitting = [f for f in np.arange(first, last + 1) if _fits(time, 1 / f, unit)]
+        if len(fitting) == 1:
+            return float(1 / fitting[0]), ()
     if doubt <= _LOOSE * step:
         return step, ()
     return step, (

@@ -24,7 +24,10 @@ _CELL = {
     ",": re.compile(rf"[+-]?(?:\d+,?\d*|,\d+){_EXPONENT}|{_NO_NUMBER}", re.IGNORECASE),
 }
 _COMMA_NUMBER = re.compile(r"[+-]?\d*,\d+(?:[eEdD][+-]?\d+)?|[+-]?\d+(?:[eEdD][+-]?\d+)?")
+_LONE_COMMA = re.compile(rf"[+-]?\d+,\d+{_EXPONENT}|[+-]?\d+")
+_ZEROS = re.compile(rf"[+-]?\d+,0\d+{_EXPONENT}|-0,\d+{_EXPONENT}")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+")
+_WHOLE = re.compile(r"[\s\"']*\d+(?![.,]?\d|\.|[eEdD])")
 _MISSING = re.compile(r"(?:n/?a|null|none|missing|-+|\*+|#\S*)?", re.IGNORECASE)
 
 
@@ -37,6 +40,7 @@ class Table:
         before: how many of them stand before the first row.
         rows, places: the numbers of each row, and its line number.
         separator: ``,``, ``;``, a tab, or a blank for any white space.
+        whole: of the first two rows, whether their first number is written without decimals.
     """
 
     header: list[tuple[int, str]]
@@ -44,6 +48,7 @@ class Table:
     rows: list[list[float]]
     places: list[int]
     separator: str
+    whole: tuple[bool, ...] = ()
 
 
 def read_dialect(path: Path, lines: list[str]) -> Table:
@@ -80,7 +85,8 @@ def read_dialect(path: Path, lines: list[str]) -> Table:
         cells = split_line(line, separator)
         if len(cells) == len(rows[0]) > 1 and _is_damaged(cells, decimal):
             raise _not_numbers(path, number, line)
-    return Table(header, before, rows, [number for number, _ in body], separator)
+    whole = tuple(bool(_WHOLE.match(line)) for _, line in body[:2])
+    return Table(header, before, rows, [number for number, _ in body], separator, whole)
 
 
 def split_line(line: str, separator: str) -> list[str]:
@@ -132,6 +138,10 @@ def _style(path: Path, header: list, body: list[tuple[int, str]]) -> tuple[str, 
         _COMMA_NUMBER.fullmatch(token) for row in tokens for token in row
     ):
         return " ", ","
+    if all(_LONE_COMMA.fullmatch(line.strip()) for line in sample) and any(
+        _ZEROS.fullmatch(line.strip()) for line in sample
+    ):
+        return " ", ","  # whole numbers are not written with zeros in front
     columns = len(split_line(sample[0].rstrip(", "), ","))
     named = header and len(split_line(header[-1][1], ",")) == columns
     if columns % 2 == 0 and not named:

@@ -32,7 +32,7 @@ from ...errors import InputError
 from ..units import TO_SI, is_unit, looks_like_unit, parse_unit, time_unit
 
 _BRACKET = re.compile(r"\[([^\[\]]*)\]|\(((?:[^()]|\([^()]*\))*)\)|\{([^{}]*)\}")
-_VALUE_BEFORE = re.compile(r"\d\s*$")
+_VALUE_BEFORE = re.compile(r"(?:[=:]\s*[-+]?[\d.]+|\d*\.\d+|\de[-+]?\d+)\s*$", re.IGNORECASE)
 _VALUE_AFTER = re.compile(r"\s*[=:]\s*[-+]?[\d.]")
 _OF_A_VALUE = re.compile(
     r"\b(?:pg[avd]|peak|max\w*|min\w*|rms|scale\w*|factor|sensitivity|range|resolution|lsb|arias)\b",
@@ -126,12 +126,22 @@ def parse_cell(text: str) -> Cell:
             return Cell((text[: match.start()] + text[match.end() :]).strip(" /,_"), inside)
         if inside in ("-", "1"):
             return Cell(text[: match.start()].strip(), inside)
-    for pattern in (r"(.+?)\s+in\s+(.+)", r"(.+?)\s*[,;]\s*(.+)", r"([^/]+?)\s*/\s*(.+)",
-                    r"(.+?)[\s_]+(\S+)", r"(.+?)_(\S+)"):  # fmt: skip
-        match = re.fullmatch(pattern, text, re.IGNORECASE)
-        if match and _stands_alone(match[2]):
-            return Cell(match[1].strip(), match[2])
+    for name, tail in _tails(text):
+        if _stands_alone(tail):
+            return Cell(name.strip(" /,_"), tail)
     return Cell(text, None)
+
+
+def _tails(text: str) -> list[tuple[str, str]]:
+    """(name, what may be its unit): after ``in``, after blanks, commas and underscores, after /.
+
+    Known units come first, then the last word alone.
+    """
+    places = list(re.finditer(r"(?:\s+in)?[\s,;_]+(?=\S)", text))
+    tails = [(text[: m.start()], text[m.end() :]) for m in places if m.start()]
+    slash = re.fullmatch(r"([^/]*[^\W\d_])\s*/\s*(.+)", text)
+    known = [pair for pair in tails if is_unit(pair[1]) or time_unit(pair[1]) is not None]
+    return known + tails[-1:] + ([(slash[1], slash[2])] if slash else [])
 
 
 def _stands_alone(tail: str) -> bool:
@@ -148,6 +158,10 @@ def column_cells(line: str, split: list[str], columns: int) -> tuple[Cell, ...]:
     """
     if columns == 1:
         split = [line]
+        if _DECLARED.search(line) or _OF_A_VALUE.search(line):
+            return ()
+        if any(_VALUE_BEFORE.search(line[: found.start()]) for found in _BRACKET.finditer(line)):
+            return ()
     tries = [split, re.split(r"\s{2,}|\t", line), re.findall(r"[^\])}]*[\])}]", line), line.split()]
     for cells in tries:
         cells = [cell for cell in cells if cell.strip()]
@@ -160,9 +174,12 @@ def column_cells(line: str, split: list[str], columns: int) -> tuple[Cell, ...]:
     return ()
 
 
-def is_units_row(cells: tuple[Cell, ...]) -> bool:
-    """Whether a line of titles holds units only."""
-    return bool(cells) and all(not cell.name and cell.unit for cell in cells)
+def units_row(cells: tuple[Cell, ...]) -> tuple[str, ...]:
+    """The units of a line that holds nothing else, one a column; empty for any other line."""
+    units = [cell.unit if not cell.name else cell.name for cell in cells]
+    alone = all(not (cell.name and cell.unit) for cell in cells)
+    good = alone and all(unit and looks_like_unit(unit) for unit in units)
+    return tuple(units) if good and any(map(is_unit, units)) else ()
 
 
 def says_value(line: str) -> bool:

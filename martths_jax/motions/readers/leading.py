@@ -21,7 +21,7 @@ def without_counts(path: Path, table: Table, dt: float | None):
     rows = table.rows
     if len(rows) < 4:
         return table, None, None, ()
-    for taken, count, step in _openings(rows):
+    for taken, count, step in _openings(rows, table.whole):
         rest = rows[taken:]
         wide = len(rows[0]) > 1 and len(rest[0]) == len(rows[0])
         sizes = {len(rest)} if wide else {len(rest), sum(map(len, rest))}
@@ -45,16 +45,24 @@ def without_counts(path: Path, table: Table, dt: float | None):
     return table, None, None, ()
 
 
-def _openings(rows: list[list[float]]):
+def _openings(rows: list[list[float]], whole: tuple[bool, ...]):
     """(lines taken, count, step or None) of every way the first rows can be read."""
     first, second = rows[0], rows[1]
-    if len(first) == 1 and _is_count(first[0]):
+    if not any(whole):
+        return
+    if len(first) == 1 and whole[0] and _is_count(first[0]):
         if len(second) == 1 and 0 < second[0] <= 1:
             yield 2, first[0], second[0]
         yield 1, first[0], None
-    if len(first) == 1 and len(second) == 1 and 0 < first[0] <= 1 and _is_count(second[0]):
+    if (
+        len(first) == 1
+        and len(second) == 1
+        and 0 < first[0] <= 1
+        and whole[1]
+        and _is_count(second[0])
+    ):
         yield 2, second[0], first[0]
-    if len(first) == 2 and _is_count(first[0]) and 0 < first[1] <= 1:
+    if len(first) == 2 and whole[0] and _is_count(first[0]) and 0 < first[1] <= 1:
         yield 1, first[0], first[1]
 
 
@@ -64,7 +72,7 @@ def _is_count(value: float) -> bool:
 
 def _refuse_odd_first(path: Path, table: Table) -> None:
     """`InputError` where a lone whole number stands above numbers with decimals."""
-    if any(len(row) != 1 for row in table.rows[:1]):
+    if len(table.rows[0]) != 1 or not table.whole[0]:
         return
     first = table.rows[0][0]
     rest = np.concatenate([np.asarray(row) for row in table.rows[1:]])

@@ -19,9 +19,9 @@ from .grammar import (
     agreed_unit,
     column_cells,
     is_acceleration,
-    is_units_row,
     other_quantity,
     says_value,
+    units_row,
     units_said,
 )
 from .leading import without_counts
@@ -76,19 +76,19 @@ def read_table(path: Path, content: bytes, *, variable=None, dt=None) -> Content
 def _titles(table: Table) -> Titles:
     """The last line before the rows that has a title for each column, with a row of units."""
     columns = len(table.rows[0])
-    units: tuple[tuple[Cell, ...], int] | None = None
+    units: tuple[tuple[str, ...], int] | None = None
     for number, line in reversed(table.header[: table.before]):
         cells = column_cells(line, split_line(line, table.separator), columns)
         if not cells or says_value(line):
             continue
-        if is_units_row(cells) and units is None:
-            units = (cells, number)
+        if units is None and (row := units_row(cells)):
+            units = (row, number)
         elif units:
-            both = tuple(Cell(n.name, u.unit) for n, u in zip(cells, units[0], strict=True))
+            both = tuple(Cell(n.name, unit) for n, unit in zip(cells, units[0], strict=True))
             return Titles(both, (number, units[1]))
         else:
             return Titles(cells, (number,))
-    return Titles(units[0], (units[1],)) if units else Titles()
+    return Titles(tuple(Cell("", u) for u in units[0]), (units[1],)) if units else Titles()
 
 
 def _series(path, table: Table, titles: Titles, variable, dt, count) -> Contents:
