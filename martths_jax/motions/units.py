@@ -80,7 +80,7 @@ def time_unit(text: str) -> float | None:
 def looks_like_unit(text: str) -> bool:
     """Whether `text` is built like a unit, of whatever quantity (``mg``, ``ft/s2``, ``g/10``)."""
     plain = _plain(text)
-    if plain in _DIRECTIONS:
+    if plain.strip("()[]") in _DIRECTIONS:
         return False
     return plain in _SPELLINGS or plain in _TIMES or bool(_BUILT.fullmatch(plain))
 

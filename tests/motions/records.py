@@ -60,13 +60,16 @@ def wave(seed: int, samples: int, dt: float) -> np.ndarray:
 
 
 @st.composite
-def tables(draw) -> Written:
-    """A plain table in any unit, header, separator, decimal sign, encoding, order and format."""
+def tables(draw, foreign: bool = False) -> Written:
+    """A plain table in any unit, header, separator, decimal sign, encoding, order and format.
+
+    With `foreign` the header names a unit that is none of the samples'.
+    """
     dt = draw(st.sampled_from([0.005, 0.01, 0.02, 1 / 256, 1 / 128, 0.0025]))
     samples = draw(st.integers(40, 90))
     base = wave(draw(st.integers(0, 99)), samples, dt)
     unit = draw(st.sampled_from(sorted(TO_SI)))
-    spelt = draw(st.sampled_from(SPELLINGS[unit]))
+    spelt = draw(st.sampled_from(FOREIGN if foreign else SPELLINGS[unit]))
     decimal = draw(st.sampled_from([".", ","]))
     separators = [";", "\t", "  "] if decimal == "," else [",", ";", "\t", "  ", ", "]
     separator = draw(st.sampled_from(separators))
@@ -79,7 +82,9 @@ def tables(draw) -> Written:
     timed = draw(st.booleans())
     if timed:
         scale, name = draw(st.sampled_from([(1.0, "s"), (1.0, "sec"), (1e3, "ms")]))
-        digits = draw(st.sampled_from([3, 4, 6, 8])) if scale == 1.0 else draw(st.sampled_from([1, 4]))
+        digits = (
+            draw(st.sampled_from([3, 4, 6, 8])) if scale == 1.0 else draw(st.sampled_from([1, 4]))
+        )
         columns.append([f"{k * dt * scale:.{digits}f}" for k in range(samples)])
         names.append((draw(st.sampled_from(["time", "Time", "t"])), name))
     if timed and draw(st.booleans()):
@@ -95,7 +100,8 @@ def tables(draw) -> Written:
     lines = [separator.join(columns[k][row] for k in order) for row in range(samples)]
     if decimal == ",":
         lines = [line.replace(".", ",") for line in lines]
-    form = draw(st.sampled_from(["[]", "()", "in", "row", "declared", "none"]))
+    forms = ["[]", "()", "in", "row", "declared", "none"]
+    form = draw(st.sampled_from(forms[:-1] if foreign else forms))
     if len(columns) > 2 and form in ("none", "declared"):
         form = "[]"
     if timed and names[1][1] == "ms" and form in ("none", "declared"):
@@ -124,7 +130,9 @@ def _titles(draw, form: str, names: list, separator: str, spelt: str) -> list[st
     if form == "none":
         return [separator.join(name for name, _ in names)] if draw(st.booleans()) else []
     if form == "declared":
-        said = draw(st.sampled_from(["UNITS OF {}", "units: {}", "The units are ({})", "Unit = {}"]))
+        said = draw(
+            st.sampled_from(["UNITS OF {}", "units: {}", "The units are ({})", "Unit = {}"])
+        )
         return ["# acceleration, " + said.format(spelt)]
     if form == "row":
         if separator == "  " and any(" " in unit for _, unit in names):

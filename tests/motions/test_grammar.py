@@ -1,7 +1,6 @@
 """A record written in any way reads back right, or is refused; it is never another motion."""
 
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from martths_jax.errors import InputError
 from martths_jax.motions import load_record
 from martths_jax.motions.units import TO_SI
 
-from .records import FOREIGN, Written, running, tables
+from .records import Written, running, tables
 
 FEW = settings(max_examples=250, deadline=None, suppress_health_check=list(HealthCheck))
 
@@ -59,3 +58,35 @@ def test_another_unit_than_the_header_says_is_refused(one, unit):
         return
     with pytest.raises(InputError, match="`units` \\(--units\\)"):
         read(one, units=unit)
+
+
+@FEW
+@given(tables(foreign=True), st.sampled_from([None, *sorted(TO_SI)]))
+def test_a_unit_of_another_quantity_is_refused_whatever_is_asked(one, unit):
+    with pytest.raises(InputError):
+        read(one, units=unit)
+
+
+@FEW
+@given(st.one_of(tables(), running()), st.data())
+def test_a_damaged_row_is_never_another_motion(one, data):
+    """A cell lost or broken, a row left out: the right motion, or a refusal."""
+    text = one.content.decode(
+        "utf-16" if one.content[:2] in (b"\xff\xfe", b"\xfe\xff") else "cp1252"
+    )
+    lines = text.splitlines()
+    rows = [k for k, line in enumerate(lines) if line[:1].isdigit() or line[:1] in "-. "]
+    row = data.draw(st.sampled_from(rows[1:-1]))
+    broken = data.draw(st.sampled_from(["", "n/a", "1.2.3", "--", "0.1;0.2;0.3;0.4;0.5", "x"]))
+    words = lines[row].split(";")
+    lines[row] = ";".join([*words[:-1], broken])
+    damaged = Written(
+        "\n".join(lines).encode(), one.ending, one.options, one.acceleration, one.dt, one.told
+    )
+    try:
+        record = read(damaged)
+    except InputError:
+        return
+    # A line that is gone leaves no trace where there are no times.
+    assert broken == "" and len(words) == 1, "a broken row was read"
+    assert record.acceleration.size < one.acceleration.size

@@ -56,7 +56,7 @@ _OTHER = re.compile(
 _DECLARED = re.compile(
     r"\bunits?\b(?P<word>\s*(?:of|are|is|in|:|=)+)?(?:\s*(?:of|are|is|in|:|=))*\s*", re.IGNORECASE
 )
-_IN = re.compile(r"\bacc\w*\b[^=:\d\[(]*?\bin\s+(?:units\s+of\s+)?[\[({]?", re.IGNORECASE)
+_IN = re.compile(r"\bacc\w*\b[^=:\d\[(]*?\b(?P<word>in)\s+(?:units\s+of\s+)?[\[({]?", re.IGNORECASE)
 _DIRECTION = re.compile(r"[NSEWUDVHLTXYZ][NSEWUD]?[ -]?\w{0,3}|-?\d+|[NSEW]\d+[NSEW]", re.I)
 
 
@@ -126,29 +126,32 @@ def parse_cell(text: str) -> Cell:
             return Cell((text[: match.start()] + text[match.end() :]).strip(" /,_"), inside)
         if inside in ("-", "1"):
             return Cell(text[: match.start()].strip(), inside)
-    for name, tail in _tails(text):
-        if _stands_alone(tail):
-            return Cell(name.strip(" /,_"), tail)
-    return Cell(text, None)
+    found = _tail(text)
+    return Cell(found[0].strip(" /,_"), found[1]) if found else Cell(text, None)
 
 
-def _tails(text: str) -> list[tuple[str, str]]:
-    """(name, what may be its unit): after ``in``, after blanks, commas and underscores, after /.
+def _tail(text: str) -> tuple[str, str] | None:
+    """Name and unit of a title without brackets.
 
-    Known units come first, then the last word alone.
+    The unit stands after ``in``, a blank, a comma or an underscore, or after a slash (``a/g``).  A
+    last word that is built like another unit counts, but for one letter: ``acc V`` is a direction.
     """
     places = list(re.finditer(r"(?:\s+in)?[\s,;_]+(?=\S)", text))
-    tails = [(text[: m.start()], text[m.end() :]) for m in places if m.start()]
+    tails = [(text[: m.start()], text[m.end() :], m[0].strip().lower() == "in") for m in places]
     slash = re.fullmatch(r"([^/]*[^\W\d_])\s*/\s*(.+)", text)
-    known = [pair for pair in tails if is_unit(pair[1]) or time_unit(pair[1]) is not None]
-    return known + tails[-1:] + ([(slash[1], slash[2])] if slash else [])
+    for name, tail, said in tails:
+        if name and (_is_known(tail) or (said and looks_like_unit(tail))):
+            return name, tail
+    last = [(name, tail) for name, tail, _ in tails[-1:]] + ([slash.groups()] if slash else [])
+    for name, tail in last:
+        other = looks_like_unit(tail) and len(tail) > 1 and tail.lower() != "in"
+        if name and (_is_known(tail) or other):
+            return name, tail
+    return None
 
 
-def _stands_alone(tail: str) -> bool:
-    """Whether the last word of a title is a unit without brackets; ``acc V`` is a direction."""
-    if is_unit(tail) or time_unit(tail) is not None:
-        return True
-    return looks_like_unit(tail) and (len(tail) > 1 and tail.lower() not in ("in", "v", "m"))
+def _is_known(text: str) -> bool:
+    return is_unit(text) or time_unit(text) is not None
 
 
 def column_cells(line: str, split: list[str], columns: int) -> tuple[Cell, ...]:
@@ -156,9 +159,11 @@ def column_cells(line: str, split: list[str], columns: int) -> tuple[Cell, ...]:
 
     `split` are the line's cells by the separator of the rows.
     """
+    if any(found["word"] for found in _DECLARED.finditer(line)):
+        return ()
     if columns == 1:
         split = [line]
-        if _DECLARED.search(line) or _OF_A_VALUE.search(line):
+        if _OF_A_VALUE.search(line):
             return ()
         if any(_VALUE_BEFORE.search(line[: found.start()]) for found in _BRACKET.finditer(line)):
             return ()
@@ -179,7 +184,7 @@ def units_row(cells: tuple[Cell, ...]) -> tuple[str, ...]:
     units = [cell.unit if not cell.name else cell.name for cell in cells]
     alone = all(not (cell.name and cell.unit) for cell in cells)
     good = alone and all(unit and looks_like_unit(unit) for unit in units)
-    return tuple(units) if good and any(map(is_unit, units)) else ()
+    return tuple(units) if good else ()
 
 
 def says_value(line: str) -> bool:
@@ -202,7 +207,7 @@ def _declared(path: Path, number: int, line: str) -> list[Said]:
         for match in pattern.finditer(line):
             rest = line[match.end() :].strip(" \t[({\"'")
             parts = [first_unit(part) for part in re.split(r"[,;&\t]", rest)]
-            units = [part for part in parts if part]
+            units = [part for part in parts if part and (match["word"] or is_unit(part))]
             kind = re.search(r"velocity|displacement", line, re.IGNORECASE)
             if units and kind and not _ACCELERATION.search(line):
                 raise other_quantity(path, number, kind[0].lower())
@@ -225,7 +230,7 @@ def first_unit(text: str) -> str | None:
         joined = " ".join(words[:count]).strip(" .,;:)]}\"'")
         if joined.count("(") > joined.count(")"):
             joined += ")"
-        if (is_unit(joined) or looks_like_unit(joined)) and not re.fullmatch(r"[vV]", joined):
+        if looks_like_unit(joined):
             return joined
     return None
 

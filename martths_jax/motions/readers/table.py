@@ -88,7 +88,11 @@ def _titles(table: Table) -> Titles:
             return Titles(both, (number, units[1]))
         else:
             return Titles(cells, (number,))
-    return Titles(tuple(Cell("", u) for u in units[0]), (units[1],)) if units else Titles()
+    if units is None:
+        return Titles()
+    # One letter without a title above it is a direction (V, H), but for that of g.
+    cells = tuple(Cell("", u) if len(u) > 1 or u in "gGsS" else Cell(u, None) for u in units[0])
+    return Titles(cells, (units[1],))
 
 
 def _series(path, table: Table, titles: Titles, variable, dt, count) -> Contents:
