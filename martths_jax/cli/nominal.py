@@ -15,6 +15,7 @@ from martths_jax import published
 from martths_jax.benchmark import build_benchmark
 from martths_jax.cli.console import console, progress
 from martths_jax.cli.motion_options import (
+    Dt,
     Motions,
     Pga,
     Records,
@@ -22,6 +23,7 @@ from martths_jax.cli.motion_options import (
     Sa,
     Scale,
     Units,
+    Variable,
     load_all,
 )
 from martths_jax.controllers import ADFC, LQG, Passthrough
@@ -104,6 +106,8 @@ def run(
     pga: Pga = None,
     sa: Sa = None,
     units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
     resample: Resample = "linear",
 ) -> None:
     """Run one trial and save its signals and indices.
@@ -111,7 +115,7 @@ def run(
     Writes, for each motion, NAME_signals.npz (time histories; strokes and commands in mm, motion in
     m and rad, force in N and N m), NAME_indices.csv and NAME_run.json (status and settings).
     """
-    motions = load_all(motion, records, scale, pga, sa, units, resample, fs)
+    motions = load_all(motion, records, scale, pga, sa, units, resample, fs, dt, variable)
     benchmark = build_benchmark(fs, integrator)
     drive = build_controller(controller, benchmark)
     plants = nominal_plant() if trial == 0 else draw_plants(1, seed, first=trial)
@@ -173,6 +177,9 @@ def table4(
     ] = None,
     seed: Seed = 0,
     scale: Scale = None,
+    units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
 ) -> None:
     """The 48 numbers of Table 4 (24 indices, LQG and ADFC, nominal plant) beside those in print.
 
@@ -182,7 +189,7 @@ def table4(
     names = motion or default_motions(records)
     if not names:
         raise argument_error("--motion", "name at least one motion", "none")
-    motions = load_all(names, records, scale)
+    motions = load_all(names, records, scale, units=units, dt=dt, variable=variable)
     benchmark = build_benchmark()
     with progress("Table 4", 2 * len(motions)) as tell:
         found = compare_with_table4(benchmark, motions, noise=SensorNoise(seed=seed), progress=tell)

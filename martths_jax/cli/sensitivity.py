@@ -9,7 +9,17 @@ import typer
 from rich.markup import escape
 
 from martths_jax.cli.console import console
-from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
+from martths_jax.cli.motion_options import (
+    Dt,
+    Motions,
+    Pga,
+    Records,
+    Resample,
+    Sa,
+    Scale,
+    Units,
+    Variable,
+)
 from martths_jax.cli.run_options import (
     AllowMixed,
     Config,
@@ -51,6 +61,8 @@ def sensitivity(
     pga: Pga = None,
     sa: Sa = None,
     units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
     resample: Resample = None,
     index: Annotated[
         list[str] | None,
@@ -73,8 +85,8 @@ def sensitivity(
     """What drives each index: Sobol' indices of plant parameters, noise and motion."""
     given = given_settings(
         motions, motion_list, trials=trials, seed=seed, controllers=controllers, records=records,
-        scale=scale, pga=pga, sa=sa, units=units, resample=resample, out=out, devices=devices,
-        memory_gb=memory_gb,
+        scale=scale, pga=pga, sa=sa, units=units, dt=dt, variable=variable, resample=resample,
+        out=out, devices=devices, memory_gb=memory_gb,
     )  # fmt: skip
     if devices is not None and devices > 0:
         set_devices(devices)

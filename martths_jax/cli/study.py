@@ -10,7 +10,17 @@ import typer
 from rich.markup import escape
 
 from martths_jax.cli.console import console, error_console
-from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
+from martths_jax.cli.motion_options import (
+    Dt,
+    Motions,
+    Pga,
+    Records,
+    Resample,
+    Sa,
+    Scale,
+    Units,
+    Variable,
+)
 from martths_jax.cli.run_options import (
     AllowMixed,
     Devices,
@@ -51,6 +61,8 @@ def study(
     pga: Pga = None,
     sa: Sa = None,
     units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
     resample: Resample = None,
     draws: Annotated[
         str | None, typer.Option("--draws", help="independent, lhs or sobol [independent].")
@@ -107,7 +119,8 @@ def study(
     given = {
         "trials": trials, "seed": seed, "controllers": controllers or None, "motions":
         motions or None, "records": records, "scale": scale, "pga": pga, "sa": sa, "units": units,
-        "resample": resample, "draws": draws, "plants": plants, "plants_as": plants_as,
+        "dt": dt, "variable": variable, "resample": resample, "draws": draws, "plants": plants,
+        "plants_as": plants_as,
         "out": out, "keep": trial_list(keep), "signals": signals, "devices": devices,
         "memory_gb": memory_gb, "max_failed": max_failed,
     }  # fmt: skip

@@ -9,7 +9,17 @@ import typer
 from rich.markup import escape
 
 from martths_jax.cli.console import console
-from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
+from martths_jax.cli.motion_options import (
+    Dt,
+    Motions,
+    Pga,
+    Records,
+    Resample,
+    Sa,
+    Scale,
+    Units,
+    Variable,
+)
 from martths_jax.cli.run_options import (
     AllowMixed,
     Config,
@@ -71,6 +81,8 @@ def sweep(
     pga: Pga = None,
     sa: Sa = None,
     units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
     resample: Resample = None,
     index: Annotated[
         list[str] | None,
@@ -96,8 +108,8 @@ def sweep(
     axes += [split_axis(text) for text in axis or ()]
     given = given_settings(
         motions, motion_list, trials=trials, seed=seed, controllers=controllers, records=records,
-        scale=scale, pga=pga, sa=sa, units=units, resample=resample, out=out, devices=devices,
-        memory_gb=memory_gb,
+        scale=scale, pga=pga, sa=sa, units=units, dt=dt, variable=variable, resample=resample,
+        out=out, devices=devices, memory_gb=memory_gb,
     )  # fmt: skip
     settings = {} if config is None else read_toml(config)
     chosen = make_sweep(

@@ -143,6 +143,8 @@ def study_motion(given, config: StudyConfig) -> Motion:
         pga=config.pga,
         sa=config.sa,
         resample=config.resample,
+        dt=config.dt,
+        variable=config.variable,
     )
 
 

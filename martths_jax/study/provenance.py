@@ -97,8 +97,8 @@ def identity(plan: Plan) -> dict:
     it, unless the plants depend on it (Latin hypercube, Sobol', CSV).
     """
     settings = as_settings(plan.config)
-    loaded = {"records", "motions", "scale", "pga", "sa", "units", "resample", "trials",
-              "plants", "plants_as", "controller", "controllers"}  # fmt: skip
+    loaded = {"records", "motions", "scale", "pga", "sa", "units", "dt", "variable", "resample",
+              "trials", "plants", "plants_as", "controller", "controllers"}  # fmt: skip
     found = {k: v for k, v in settings.items() if k not in loaded | RUN_ONLY}
     if plan.draws.table is not None:
         found |= {"trials": plan.trials, "plants_sha256": plan.draws.sha256}
