@@ -24,8 +24,9 @@ from martths_jax.plant import (
     plant_from_draws,
     plant_from_hz,
 )
+from martths_jax.result import Result
 from martths_jax.sensors import SensorNoise
-from martths_jax.simulation import Result, simulate
+from martths_jax.simulation import simulate
 from martths_jax.structure.experimental import Quirks
 from martths_jax.watch import Status
 

@@ -185,7 +185,7 @@ def _check_rate(fs: float, plant: Plants) -> None:
 
 
 def continuous_plant(plant: Plants | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Dense continuous (A, B, C) of one plant, nominal by default, its states as in ``to_dense``."""
+    """Dense continuous (A, B, C) of a plant (default: nominal), states as in ``to_dense``."""
     values = NOMINAL_HZ[None] if plant is None else plant.parameters_hz
     real, frame, real_residue, frame_residue = (
         np.asarray(x)[..., 0] for x in continuous_modes(values)

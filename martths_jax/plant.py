@@ -289,14 +289,14 @@ def check_plants(plants: Plants, name: str = "draws") -> Plants:
     return plants
 
 
-def _factors(parameters_hz: jax.Array):
+def _factors(parameters_hz: jax.Array, xp=jnp):
     """Zeros, real poles, frame pole [rad/s] and rescaled gains of a batch of plants.
 
     Returns:
         zeros: per output and column, list of (T,) arrays; poles: per column (p1, p2); frame: (T,)
         complex; gain: (2, 2, T), rescaled so that the DC gain stays nominal.
     """
-    s = jnp.moveaxis(jnp.asarray(parameters_hz), -1, 0) * HZ
+    s = xp.moveaxis(xp.asarray(parameters_hz), -1, 0) * HZ
     z1, z2, p1, p2, frame, z12, z22, p3, p4 = s
     frame = frame * FRAME_POLE_HZ
     zeros = [[(z1, z2), (z12,)], [(z1, z2), (z22,)]]
@@ -311,7 +311,7 @@ def _factors(parameters_hz: jax.Array):
         for j in range(2):
             dc = NOMINAL_GAIN[i, j] * np.prod([-z for z in nominal_zeros[i][j]])
             dc = dc / (np.prod([-p for p in nominal_poles[j]]) * pair)
-            numerator = jnp.prod(jnp.stack([-z for z in zeros[i][j]]), axis=0)
+            numerator = xp.prod(xp.stack([-z for z in zeros[i][j]]), axis=0)
             row.append(dc * poles[j][0] * poles[j][1] * (frame * frame.conj()).real / numerator)
         gain.append(row)
     return zeros, poles, frame, gain
@@ -325,19 +325,20 @@ def frequency_response(parameters_hz, frequency_hz) -> jax.Array:
         frequency_hz: (F,) frequencies [Hz].
 
     Returns:
-        (F, 2, 2, T) complex response, mm a mm.
+        (F, 2, 2, T) complex response, mm a mm; by NumPy, without compiling, for NumPy's arrays.
     """
-    zeros, poles, frame, gain = _factors(parameters_hz)
-    s = 2j * jnp.pi * jnp.asarray(frequency_hz)[:, None]
+    xp = np if isinstance(parameters_hz, np.ndarray) else jnp
+    zeros, poles, frame, gain = _factors(parameters_hz, xp)
+    s = 2j * xp.pi * xp.asarray(frequency_hz)[:, None]
 
     def entry(i, j):
-        numerator = gain[i][j] * jnp.ones_like(s)
+        numerator = gain[i][j] * xp.ones_like(s)
         for z in zeros[i][j]:
             numerator = numerator * (s - z)
         p, q = poles[j]
         return numerator / ((s - p) * (s - q) * (s - frame) * (s - frame.conj()))
 
-    return jnp.stack([jnp.stack([entry(i, j) for j in range(2)], 1) for i in range(2)], 1)
+    return xp.stack([xp.stack([entry(i, j) for j in range(2)], 1) for i in range(2)], 1)
 
 
 def continuous_modes(parameters_hz: jax.Array):

@@ -12,6 +12,7 @@ from martths_jax import __version__
 from martths_jax.cli import figures, motions, nominal, sensitivity, study, sweep, tune
 from martths_jax.cli.console import error_console
 from martths_jax.errors import InputError
+from martths_jax.runtime import check_devices
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -49,7 +50,7 @@ def _root(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    pass
+    check_devices()
 
 
 def main() -> None:

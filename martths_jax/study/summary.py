@@ -134,7 +134,8 @@ def _percentiles(dataset, controller: str, motion: str) -> Table:
         ))  # fmt: skip
     heads = ("index", *(f"P{p}" for p in PERCENTS), "trials", "nominal")
     note = f"In brackets: {LEVEL:.0%} bootstrap confidence intervals."
-    title = f"{controller} on {motion}: {rows[0][-2]} of {len(value) - 1} trials"
+    whole = int(np.sum(np.all(np.isfinite(value[1:]), axis=1)))
+    title = f"{controller} on {motion}: {whole} of {len(value) - 1} trials"
     return Table(title, heads, rows, (note,), aside=("trials", "nominal"))
 
 

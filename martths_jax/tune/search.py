@@ -16,6 +16,7 @@ from martths_jax.benchmark import VOLT_LIMIT, Benchmark
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import Motion
 from martths_jax.plant import draw_plants
+from martths_jax.runtime import check_runtime
 from martths_jax.sensors import SensorNoise
 from martths_jax.tune.gradient import Gradient
 from martths_jax.tune.objective import Objective
@@ -105,6 +106,7 @@ def tune(
     Raises:
         InputError: for options that cannot be used, or a start with which a trial diverges.
     """
+    check_runtime()
     objective, start = options.check()
     setting = asdict(options) | {"motions": [[m.name, len(m.acceleration)] for m in motions]}
     setting = json.loads(json.dumps({k: v for k, v in setting.items() if k != "steps"}))
