@@ -14,6 +14,7 @@ from martths_jax import __version__
 from martths_jax.cli import figures, motions, nominal, sensitivity, study, sweep, tune
 from martths_jax.cli.console import accept_any_text, error_console
 from martths_jax.errors import InputError
+from martths_jax.runtime import check_devices
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -51,7 +52,7 @@ def _root(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    pass
+    check_devices()
 
 
 def main() -> None:

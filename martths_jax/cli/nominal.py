@@ -10,10 +10,11 @@ from typing import Annotated
 
 import numpy as np
 import typer
+from rich.markup import escape
 
 from martths_jax import published
 from martths_jax.benchmark import build_benchmark
-from martths_jax.cli.console import console, progress
+from martths_jax.cli.console import console, error_console, progress
 from martths_jax.cli.motion_options import (
     Dt,
     Motions,
@@ -113,12 +114,14 @@ def run(
     """Run one trial and save its signals and indices.
 
     Writes, for each motion, NAME_signals.npz (time histories; strokes and commands in mm, motion in
-    m and rad, force in N and N m), NAME_indices.csv and NAME_run.json (status and settings).
+    m and rad, force in N and N m), NAME_indices.csv and NAME_run.json (status and settings).  A
+    trial that diverges has no indices: its files are written all the same, and the exit code is 1.
     """
     motions = load_all(motion, records, scale, pga, sa, units, resample, fs, dt, variable)
     benchmark = build_benchmark(fs, integrator)
     drive = build_controller(controller, benchmark)
     plants = nominal_plant() if trial == 0 else draw_plants(1, seed, first=trial)
+    lost = []
     with progress(f"{controller.value}, trial {trial}", len(motions)) as tell:
         for done, one in enumerate(motions, 1):
             result = simulate(benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True)
@@ -127,8 +130,14 @@ def run(
                 console.print(f"[yellow]Note:[/] {notice}", highlight=False)
             console.print(str(result), highlight=False)
             _print_indices(result)
+            if result.lost[0]:
+                lost.append(f"{result.controller} on {one.name}: {result.describe(0)}")
             tell(done)
     console.print(f"Saved in {out}", highlight=False)
+    if lost:
+        for line in lost:
+            error_console.print(f"[bold red]Diverged:[/] {escape(line)}.", highlight=False)
+        raise typer.Exit(1)
 
 
 def _save_run(out: Path, motion, result, settings: dict) -> None:

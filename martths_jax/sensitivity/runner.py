@@ -11,6 +11,7 @@ import numpy as np
 from martths_jax.errors import argument_error, raise_all
 from martths_jax.indices import NAMES
 from martths_jax.plant import check_plants
+from martths_jax.runtime import check_runtime
 from martths_jax.sensitivity.design import Design, is_power_of_two, make_design, most_samples
 from martths_jax.sensitivity.results import Sensitivity, write_results
 from martths_jax.sensitivity.store import ROWS, SensitivityFolder
@@ -64,6 +65,7 @@ def run_sensitivity(
         InputError: listing every setting that cannot be used, or saying what is in the way of the
             folder's files; what was finished stays.
     """
+    check_runtime()
     shown, reporter = tuple(dict.fromkeys(shown)), reporter or Reporter()
     plan, design = build(config, shown, changes)
     head = header(plan, command_line) | {"trials": design.rows - 1}

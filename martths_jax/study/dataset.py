@@ -66,7 +66,7 @@ def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
     unit = ["ms" if name.startswith(("J1_", "J4_")) else "percent" for name in NAMES]
     variables = {
         "value": ((*cell, "index"), gather(lambda o: o.value), {
-            "long_name": "evaluation indices; NaN where the trial diverged"} | INDEX_UNITS),
+            "long_name": "evaluation indices; NaN where there is none, see status"} | INDEX_UNITS),
         "status": (cell, gather(lambda o: o.status), {
             "long_name": "how the trial ended"} | STATUS_FLAGS),
         "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {

@@ -12,6 +12,7 @@ ENGINE_MODULES = (
     "loop.py",
     "once.py",
     "plant.py",
+    "result.py",
     "runtime.py",
     "sensitivity/design.py",
     "sensors.py",
@@ -22,4 +23,5 @@ ENGINE_MODULES = (
     "study/engine.py",
     "sweep/lanes.py",
     "watch.py",
+    "xla_flags.py",
 )

@@ -16,6 +16,7 @@ from martths_jax.files import name_problems
 from martths_jax.motions import BUILTIN_NAMES, Motion, load_motion
 from martths_jax.motions.catalogue import BENCHMARK_NAMES, record_files
 from martths_jax.sensors import SensorNoise
+from martths_jax.simulation import prepare
 from martths_jax.study.config import StudyConfig, unknown_names
 from martths_jax.study.draws import Draws, make_draws
 from martths_jax.study.sources import code_of, without_source
@@ -91,6 +92,7 @@ def build_plan(config: StudyConfig) -> Plan:
             made = attempt(build_controller, given, config, benchmark)
             if made is not None:
                 name, controllers[name], settings[name] = given_name(given), *made
+                attempt(prepare, made[0], benchmark, 1)
     draws = attempt(make_draws, config)
     if draws is not None and any(trial > draws.trials for trial in config.keep):
         problems.append(

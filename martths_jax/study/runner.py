@@ -14,6 +14,7 @@ import xarray as xr
 
 from martths_jax.errors import InputError
 from martths_jax.motions import Motion
+from martths_jax.runtime import check_runtime
 from martths_jax.simulation import LANES
 from martths_jax.study import provenance
 from martths_jax.study.config import StudyConfig, as_settings, make_config
@@ -69,6 +70,7 @@ def run_study(
         InputError: listing every setting that cannot be used, or saying what is in the way of
             the folder's files; what was finished stays.
     """
+    check_runtime()
     config = make_config(config, **changes)
     if fresh and share is not None:
         raise InputError(

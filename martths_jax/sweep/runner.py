@@ -11,6 +11,7 @@ import numpy as np
 
 from martths_jax.errors import InputError, raise_all
 from martths_jax.plant import check_plants
+from martths_jax.runtime import check_runtime
 from martths_jax.simulation import LANES, Setup, prepare
 from martths_jax.study.config import StudyConfig
 from martths_jax.study.draws import Draws
@@ -65,6 +66,7 @@ def run_sweep(
         InputError: listing everything that cannot be used, before anything runs; or saying what is
             in the way of the folder's files; what was finished stays.
     """
+    check_runtime()
     if not isinstance(axes, SweepConfig):
         axes = make_sweep(axes, config, shown=shown, **changes)
     sweep, reporter = axes, reporter or Reporter()

@@ -16,6 +16,7 @@ from martths_jax.benchmark import VOLT_LIMIT, Benchmark
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import Motion
 from martths_jax.plant import draw_plants
+from martths_jax.runtime import check_runtime
 from martths_jax.sensors import SensorNoise
 from martths_jax.study.files import set_aside, write_text
 from martths_jax.study.header import sealed
@@ -115,6 +116,7 @@ def tune(
         InputError: for options that cannot be used, a start with which a trial diverges, or a
             folder that holds another tuning or in which one runs.
     """
+    check_runtime()
     options.check()
     with owned(folder, f"tune {options.controller}") as owner:
         return _descend(benchmark, options, motions, owner, tell, notice, gradient)
