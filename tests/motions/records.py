@@ -141,7 +141,9 @@ def _titles(draw, form: str, names: list, separator: str, spelt: str) -> list[st
     pattern = {"[]": "{} [{}]", "()": "{} ({})", "in": "{} in {}"}[form]
     if form == "in" and separator == "  ":
         pattern = "{}_{}"
-        names = [(name, unit.replace(" ", ".")) for name, unit in names]
+        # ``acc_V`` is a direction: only a longer word is a unit there.
+        spelt = {"V": "volt"}
+        names = [(name, spelt.get(unit, unit.replace(" ", "."))) for name, unit in names]
     titles = [pattern.format(name, unit) for name, unit in names]
     mark = draw(st.sampled_from(["", "# "]))
     if comma and draw(st.booleans()):

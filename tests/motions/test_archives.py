@@ -49,12 +49,12 @@ def csmip(channels, unit: str = "cm/sec2") -> list[str]:
     for number, (direction, values) in enumerate(channels, 1):
         peak = values[np.argmax(np.abs(values))]
         lines += [
-            f"Corrected accelerogram   89486-N2628-22354.08       Chan  {number}: {direction}     from",
+            f"Corrected accelerogram   89486-N2628-22354.08   Chan  {number}: {direction}     from",
             "Uncorrected Accelerogram Data             Processed: 12/20/22, CGS  ce89486h",
             "Station No. 89486   40.585N, 124.146W    Etna2   s/n 2628  (3 Chns of  3 at Sta)",
             f"Chan  {number}: {direction}",
             "Instr Period =  .0049 sec,  Damping =  .700,  Sensitivity =  .63 v/g",
-            f" {values.size} points of instrument- and baseline-corrected accel, veloc and displ data",
+            f" {values.size} points of instrument- and baseline-corrected accel, veloc and displ",
             "At equally-spaced intervals of   0.010  sec.",
             f"Peak acceleration = {peak:9.3f}    cm/sec/sec  at   35.020   sec.",
             "Peak   velocity   =    34.735      cm/sec    at   34.810   sec.",

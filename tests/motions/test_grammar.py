@@ -14,7 +14,7 @@ from martths_jax.motions.units import TO_SI
 
 from .records import Written, running, tables
 
-FEW = settings(max_examples=250, deadline=None, suppress_health_check=list(HealthCheck))
+FEW = settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
 
 
 def read(one: Written, **changes):

@@ -98,6 +98,12 @@ class Said:
     sure: bool = True
 
 
+def surely_acceleration(name: str, line: str) -> bool:
+    """Whether the title of an only column means the samples: by its name, or by [ ]."""
+    direction = _DIRECTION.fullmatch(name) is not None
+    return not name or "[" in line or direction or bool(_ACCELERATION.search(name))
+
+
 def is_acceleration(cell: Cell) -> bool:
     """Whether a column says that it is an acceleration, by its name or its unit."""
     return bool(_ACCELERATION.search(cell.name)) or bool(cell.unit and is_unit(cell.unit))

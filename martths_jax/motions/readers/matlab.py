@@ -12,7 +12,7 @@ from ...errors import InputError
 from ..timeaxis import uniform_step
 from ..units import is_unit, looks_like_unit, parse_unit
 from .arrays import from_array, is_table, is_vector
-from .columns import time_column
+from .columns import pick, several, time_column
 from .contents import Contents
 from .mat_files import Variables, is_hdf5, read_variables
 
@@ -55,10 +55,16 @@ def read_matlab(path: Path, content: bytes, *, variable=None, dt=None) -> Conten
             f"{where} has the shape {' x '.join(map(str, array.shape))}, but 2 x N, N x 2 (time, "
             "acceleration) or a vector is wanted; pick another array in `variable` (--variable)."
         )
-    beside = None if _is_timed(array) else _step_beside(arrays, name, max(array.shape), where, dt)
-    if beside is not None and not is_vector(array) and column:
-        array = array if array.shape[0] >= array.shape[1] else array.T
-    found = from_array(array, where, variable=column or None, dt=dt)
+    beside = _step_beside(arrays, name, max(array.shape), where, dt)
+    upright = array if array.shape[0] >= array.shape[1] else array.T
+    if beside is not None and not is_vector(array) and time_column(upright) is None:
+        names = [""] * upright.shape[1]
+        if not column:
+            raise several(where, names, list(range(len(names))))
+        values = upright[:, pick(column, names, where)]
+        found = Contents(values, None, None, where)
+    else:
+        found = from_array(array, where, variable=column or None, dt=dt)
     if found.dt is None and beside is not None:
         found = replace(found, dt=beside[0], notices=beside[1])
     return replace(found, unit=_unit(path, held, name))

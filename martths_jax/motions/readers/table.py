@@ -21,6 +21,7 @@ from .grammar import (
     is_acceleration,
     other_quantity,
     says_value,
+    surely_acceleration,
     units_row,
     units_said,
 )
@@ -212,7 +213,8 @@ def _unit(path, table: Table, titles: Titles, choice: int | None):
             raise other_quantity(path, line, cell.name or "time")
         own = [Said(cell.unit, line)]
     elif cell.unit is not None:
-        own = [Said(cell.unit, line, is_acceleration(cell) or not (single and cell.name))]
+        text = dict(table.header).get(line, "")
+        own = [Said(cell.unit, line, not single or surely_acceleration(cell.name, text))]
     free = [(n, text) for n, text in table.header if n not in titles.lines or (single and not own)]
     return agreed_unit(path, own + units_said(path, free))
 
