@@ -29,6 +29,7 @@ from martths_jax.indices import (
     trials_first,
     trials_last,
 )
+from martths_jax.study import run_study
 from tests.engine.motions import burst
 
 MOTION, QUIET = burst(0.4), SensorNoise(power=0.0)
@@ -91,6 +92,22 @@ def test_a_target_that_does_not_move_gives_no_number(benchmark, size):
     assert found.describe(1).endswith("without a value, since the target does not move")
     silent = simulate(benchmark, Passthrough(), plants, still, QUIET)
     assert all(np.isnan(value).all() for value in indices(silent).values())
+
+
+def test_a_study_marks_it(tmp_path):
+    still = Motion("still", np.zeros(300), 1024.0)
+    study = run_study(
+        trials=2, controllers=["passthrough"], motions=[still], out=tmp_path / "s", signals=False
+    )
+    data = study.dataset
+    assert np.all(data.status.values == Status.UNDEFINED) and study.failed == 0
+    flags = data.status.attrs
+    meanings = dict(zip(flags["flag_values"], flags["flag_meanings"].split(), strict=True))
+    assert meanings[Status.UNDEFINED] == "undefined"
+    assert np.isnan(data.value.sel(index="J7_4")).all()
+    assert np.isfinite(data.value.sel(index="J2_1")).all()
+    assert "passthrough on still: 0 of 2 trials" in study.summary().markdown()
+    assert ",undefined," in (tmp_path / "s" / "study.csv").read_text()
 
 
 def test_undefined_beside_lost_and_saturated(benchmark):
