@@ -162,7 +162,7 @@ def _save_run(out: Path, motion, result, settings: dict) -> None:
         "fs": result.fs,
         "controller": result.controller,
         "status": result.describe(0),
-        "volt_peak": np.asarray(result.watch.volt_peak)[:, 0].tolist(),
+        "volt_peak": np.asarray(result.watch.volt_peak)[0].tolist(),
     }
     with atomic(out / f"{stem}_run.json") as part:
         part.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")

@@ -85,10 +85,7 @@ def _check_pytree(controller) -> None:
                 f"Controller {kind} must be a pytree, but is none; put "
                 "@jax.tree_util.register_dataclass above its @dataclass(frozen=True)."
             )
-        arrays = (
-            isinstance(leaf, (np.ndarray, np.generic, jax.Array)) and leaf.dtype.kind in "biufc"
-        )
-        if not arrays and not isinstance(leaf, (bool, int, float, complex)):
+        if not _is_numeric(leaf):
             raise InputError(
                 f"Field `{_name(path)}` of controller {kind} must hold numbers, but got "
                 f"{type(leaf).__name__}; what is no number is declared "
@@ -151,6 +148,11 @@ def _step_into(place, key):
         return place[inside]
     except (TypeError, KeyError, IndexError):  # a container of the user's own
         return None
+
+
+def _is_numeric(leaf) -> bool:
+    numbers = isinstance(leaf, (bool, int, float, complex))
+    return numbers or getattr(leaf, "dtype", np.dtype(object)).kind in "biufc"
 
 
 def _name(path) -> str:
@@ -256,9 +258,7 @@ class _Look:
         """Leaves of something the controller returned, each with its name."""
         for path, leaf in jax.tree_util.tree_flatten_with_path(tree)[0]:
             name = f"{what} {jax.tree_util.keystr(path)}".strip()
-            try:
-                jnp.result_type(leaf)
-            except (TypeError, ValueError):
+            if not _is_numeric(leaf):
                 self.refuse(f"hold arrays in its {name}", type(leaf).__name__)
             yield name, leaf
 

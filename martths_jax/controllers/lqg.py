@@ -91,12 +91,13 @@ class LQG(Controller):
             ) from None
         K = np.linalg.solve(np.diag(r), B_aug.T @ X)
         K_z = np.swapaxes(K[:, :n].reshape(2, n // 2, 2), 1, 2)
-        made = cls(
-            K_z=jnp.asarray(K_z),
-            K_e=jnp.asarray(K[:, n:]),
-            estimator=design_kalman(benchmark.plant_model, q, benchmark.r_mm2),
-            weights=(("e", tuple(e)), ("r", tuple(r)), ("y", tuple(y)), ("q", float(q))),
-        )
+        with jax.ensure_compile_time_eval():  # the numbers are known, under jit too
+            made = cls(
+                K_z=jnp.asarray(K_z),
+                K_e=jnp.asarray(K[:, n:]),
+                estimator=design_kalman(benchmark.plant_model, q, benchmark.r_mm2),
+                weights=(("e", tuple(e)), ("r", tuple(r)), ("y", tuple(y)), ("q", float(q))),
+            )
         if not allow_unstable:
             refuse_unstable(benchmark, made, q)
         return made
@@ -128,7 +129,7 @@ def check_weights(e, r, y, q) -> None:
         if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(given)):
             raise argument_error(
                 name, wanted, "a traced value",
-                "design.lqg.lqg_from_weights can be traced and differentiated.",
+                "martths_jax.design.lqg.lqg_from_weights can be traced and differentiated.",
             )  # fmt: skip
         try:
             values = np.asarray(given, dtype=float)

@@ -66,6 +66,29 @@ def test_run_saves_signals_indices_and_settings(motion_file, tmp_path):
     assert (about["trial"], about["seed"], about["scale"]) == (3, 5, 1.0)
 
 
+def test_a_trial_that_diverges_ends_the_run_with_a_sentence_and_exit_code_1(motion_file, tmp_path):
+    out = tmp_path / "out"
+    result = invoke(
+        "run", "--motion", motion_file, "--controller", "lqg", "--scale", 1000, "--out", out
+    )
+    assert result.exit_code == 1, result.output
+    told = " ".join(result.output.split())
+    assert "Diverged: lqg on burst: Trial 0 diverged: command u of actuator" in told
+    about = json.loads((out / "burst_lqg_run.json").read_text())
+    assert about["status"].startswith("Trial 0 diverged") and len(about["volt_peak"]) == 2
+    rows = csv.DictReader((out / "burst_lqg_indices.csv").open())
+    assert {row["value"] for row in rows} == {"nan"}
+
+
+def test_a_rate_at_which_the_controller_runs_away_is_refused(monkeypatch, capsys, tmp_path):
+    words = ["run", "--motion", "kobe-like", "--controller", "lqg", "--fs", "512"]
+    monkeypatch.setattr(sys, "argv", ["martths", *words, "--out", str(tmp_path / "x")])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 2
+    assert "lowest sampling rate that holds is" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

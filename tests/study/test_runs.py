@@ -73,7 +73,7 @@ def test_the_numbers_are_those_of_simulate(whole, tmp_path):
     for name, values in indices(result).items():
         assert np.array_equal(there.value.sel(index=name).values, values)
     assert np.array_equal(there.status.values, result.status)
-    assert np.array_equal(there.volt_peak.values.T, result.watch.volt_peak)
+    assert np.array_equal(there.volt_peak.values, result.watch.volt_peak)
     assert np.array_equal(there.draw.values, plants.draws)
     # Common plants and noise, and no controller or motion under another's name.
     other = whole.dataset.sel(controller="passthrough")
