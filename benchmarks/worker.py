@@ -106,7 +106,7 @@ def measure(folder: Path, cases: list[dict], rounds: int) -> None:
         started = time.perf_counter()
         block = program(case, min(case["trials"], LANES * devices))()
         lanes = np.arange(case["trials"]) % len(block.trial)
-        many = lambda tree, lanes=lanes: jax.tree.map(lambda x: x[..., lanes], tree)  # noqa: E731
+        many = lambda tree, lanes=lanes: jax.tree.map(lambda x: x[lanes], tree)  # noqa: E731
         indices(replace(block, sums=many(block.sums), watch=many(block.watch)))
         answer(warm=case["table"], seconds=time.perf_counter() - started)
     for turn in range(rounds):

@@ -16,9 +16,17 @@ from martths_jax.coupler import Coupler, build_coupler
 from martths_jax.errors import InputError
 from martths_jax.indices import indices
 from martths_jax.motions import Motion, load_motion
-from martths_jax.plant import IdealPlants, Plants, draw_plants, nominal_plant, plant_from_draws
+from martths_jax.plant import (
+    IdealPlants,
+    Plants,
+    draw_plants,
+    nominal_plant,
+    plant_from_draws,
+    plant_from_hz,
+)
+from martths_jax.result import Result
 from martths_jax.sensors import SensorNoise
-from martths_jax.simulation import Result, simulate
+from martths_jax.simulation import simulate
 from martths_jax.structure.experimental import Quirks
 from martths_jax.watch import Status
 
@@ -47,6 +55,7 @@ __all__ = [
     "load_motion",
     "nominal_plant",
     "plant_from_draws",
+    "plant_from_hz",
     "runtime",
     "simulate",
 ]

@@ -10,7 +10,15 @@ import numpy as np
 
 from martths_jax.coupler import Coupler, build_coupler
 from martths_jax.errors import argument_error
-from martths_jax.plant import NOMINAL_HZ, continuous_modes, nominal_plant
+from martths_jax.plant import (
+    NOMINAL_HZ,
+    Plants,
+    continuous_modes,
+    lowest_rate,
+    nominal_plant,
+    one_plant,
+)
+from martths_jax.runtime import check_runtime
 from martths_jax.sensors import SensorNoise
 from martths_jax.structure.experimental import (
     Quirks,
@@ -23,6 +31,7 @@ from martths_jax.structure.experimental import (
 from martths_jax.structure.frame import FrameGeometry, build_reference
 from martths_jax.structure.integrators import INTEGRATORS
 from martths_jax.structure.modal import ModalSystem
+from martths_jax.structure.sections import check_positive
 from martths_jax.structure.statespace import discretise
 
 PARTITIONS = ("benchmark", "consistent")
@@ -43,8 +52,8 @@ class Benchmark:
         reference: reference structure, the same inputs and outputs.
         restoring: (3, 3, 2) taps of the restoring force, see ``restoring_maps``.
         coupler: geometry between actuators and interface.
-        plant_model: nominal plant, discretised.
-        plant_continuous: (A, B, C) of the nominal plant, states slot by slot.
+        plant_model: the plant that controllers and filters are designed for, discretised.
+        plant_continuous: (A, B, C) of that plant, states slot by slot.
         noise_power: power of the sensor noise that filters are designed for [mm^2 s].
         integrator, partition: names of the methods used.
     """
@@ -79,6 +88,7 @@ def build_benchmark(
     geometry: FrameGeometry | None = None,
     coupler: Coupler | None = None,
     quirks: Quirks | None = None,
+    plant: Plants | None = None,
     tolerance: float | None = None,
 ) -> Benchmark:
     """Build the v-maRTHS benchmark (Condori Uribe et al. 2023).
@@ -88,20 +98,22 @@ def build_benchmark(
         integrator: ``newmark`` (the benchmark's), ``rk4`` (the paper's text) or ``zoh`` (exact).
         partition: ``benchmark`` takes the ideal experimental frame out of the reference;
             ``consistent`` takes out exactly the force that is fed back (for checks).
-        geometry: of the reference frame; the published one by default.
+        geometry: of the frame.  Only the published one can be run: the experimental frame, which is
+            taken out of it and put back, keeps its own lengths and sections.
         coupler: geometry of the coupler; the published one by default.
         quirks: peculiarities of the published model, all on by default.
+        plant: one plant, from ``plant_from_hz``, which filters, LQG and ADFC's anchor are designed
+            for; the benchmark's nominal plant by default.  ``simulate`` is given the plants that
+            run, such as ``draw_plants(1000, around=plant)``.
         tolerance: of the order reduction of the structures, see ``statespace.discretise``.
 
     Raises:
-        InputError: if fs is not positive or a name is unknown.
+        InputError: for an argument that cannot be used; an fs below what the plant's poles ask.
     """
-    if not (isinstance(fs, (int, float, np.number)) and np.isfinite(fs) and fs > 0):
-        raise argument_error("fs", "be a positive sampling rate (Hz)", repr(fs))
-    if integrator not in INTEGRATORS:
-        raise argument_error("integrator", f"be one of {sorted(INTEGRATORS)}", repr(integrator))
-    if partition not in PARTITIONS:
-        raise argument_error("partition", f"be one of {sorted(PARTITIONS)}", repr(partition))
+    check_runtime()
+    plant = nominal_plant() if plant is None else one_plant("plant", plant)
+    _check_arguments(fs, integrator, partition, geometry, coupler, quirks, tolerance)
+    _check_rate(fs, plant)
     dt = 1.0 / fs
     method = INTEGRATORS[integrator]
     reference = build_reference(geometry)
@@ -110,6 +122,10 @@ def build_benchmark(
         numerical = benchmark_partition(reference, ideal_frame(quirks))
     else:
         numerical = consistent_partition(reference, experimental)
+    if np.any(np.diag(numerical.M) < 0):
+        raise argument_error(
+            "quirks", "leave every floor of the numerical substructure a mass", f"{quirks}"
+        )
     options = {} if tolerance is None else {"tolerance": tolerance}
     try:
         systems = [discretise(s, method, dt, **options) for s in (numerical, reference)]
@@ -121,18 +137,58 @@ def build_benchmark(
         reference=systems[1],
         restoring=jnp.asarray(restoring_maps(experimental, dt)),
         coupler=coupler or build_coupler(),
-        plant_model=nominal_plant().discretise(dt),
-        plant_continuous=continuous_plant(),
+        plant_model=plant.discretise(dt),
+        plant_continuous=continuous_plant(plant),
         noise_power=SensorNoise().power,
         integrator=integrator,
         partition=partition,
     )
 
 
-def continuous_plant() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Dense continuous (A, B, C) of the nominal plant, in the state order of ``to_dense``."""
+def _check_arguments(fs, integrator, partition, geometry, coupler, quirks, tolerance) -> None:
+    number = isinstance(fs, (int, float, np.number)) and not isinstance(fs, bool)
+    if not (number and np.isfinite(fs) and fs > 0):
+        raise argument_error("fs", "be a positive sampling rate (Hz)", repr(fs))
+    for name, value, known in (
+        ("integrator", integrator, sorted(INTEGRATORS)),
+        ("partition", partition, sorted(PARTITIONS)),
+    ):
+        if value not in known:
+            raise argument_error(name, f"be one of {known}", repr(value))
+    for name, value, kind in (
+        ("geometry", geometry, FrameGeometry), ("coupler", coupler, Coupler),
+        ("quirks", quirks, Quirks),
+    ):  # fmt: skip
+        if value is not None and not isinstance(value, kind):
+            raise argument_error(name, f"be a {kind.__name__} or None", repr(value)[:80])
+    for name, published in vars(FrameGeometry()).items():
+        given = published if geometry is None else getattr(geometry, name)
+        if given != published:
+            raise argument_error(
+                "geometry", f"have the published {name}, {published}", f"{given}",
+                "The experimental frame keeps its own lengths and sections, so another reference "
+                "would be run with a part that does not belong to it; build_reference(geometry) "
+                "and modes(...) take any.",
+            )  # fmt: skip
+    if tolerance is not None:
+        check_positive("tolerance", tolerance, "1")
+
+
+def _check_rate(fs: float, plant: Plants) -> None:
+    """Refuse a sampling rate that does not resolve the plant's fastest pole."""
+    least = lowest_rate(plant.parameters_hz[0])
+    if fs < least:
+        raise argument_error(
+            "fs", f"be at least {np.ceil(least):g} Hz, twice the magnitude of the plant's fastest "
+            f"pole ({least / 2:.3g} Hz)", f"{fs:g}",
+        )  # fmt: skip
+
+
+def continuous_plant(plant: Plants | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Dense continuous (A, B, C) of a plant (default: nominal), states as in ``to_dense``."""
+    values = NOMINAL_HZ[None] if plant is None else plant.parameters_hz
     real, frame, real_residue, frame_residue = (
-        np.asarray(x)[..., 0] for x in continuous_modes(NOMINAL_HZ[None])
+        np.asarray(x)[..., 0] for x in continuous_modes(values)
     )
     A, B, C = np.zeros((8, 8)), np.zeros((8, 2)), np.zeros((2, 8))
     for j in range(2):

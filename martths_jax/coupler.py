@@ -12,7 +12,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from martths_jax.errors import argument_error
 from martths_jax.once import once
+from martths_jax.runtime import check_precision
 
 MM = 1e3  # mm per m
 
@@ -20,7 +22,7 @@ MM = 1e3  # mm per m
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Coupler:
-    """Geometry of the coupler; each field a scalar or one value a trial (T,).
+    """Geometry of the coupler, the same for all trials.
 
     Attributes:
         arm: length p of an arm [m].
@@ -34,8 +36,31 @@ class Coupler:
 def build_coupler(
     arm: float = float(np.hypot(0.26670, 0.127)), alpha_deg: float = 25.4633
 ) -> Coupler:
-    """Coupler of the benchmark: arm [m] and angle at rest [degrees]."""
-    return Coupler(arm=jnp.asarray(arm), alpha=jnp.asarray(np.deg2rad(alpha_deg)))
+    """Coupler of the benchmark: arm [m] and angle at rest [degrees].
+
+    Args:
+        arm: positive; may be traced.
+        alpha_deg: between 0, where the arms lie in line, and 90 degrees; may be traced.
+
+    Raises:
+        InputError: for values outside of these ranges.
+    """
+    check_precision()
+    for name, value, most, wanted in (
+        ("arm", arm, np.inf, "be positive and finite (m)"),
+        ("alpha_deg", alpha_deg, 90.0, "lie between 0 and 90 degrees"),
+    ):
+        if isinstance(value, jax.core.Tracer):
+            continue
+        try:
+            number = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            number = np.array(np.nan)
+        if number.ndim or not 0 < number < most:
+            raise argument_error(name, wanted, repr(value)[:80])
+    traced = isinstance(alpha_deg, jax.core.Tracer)
+    alpha = jnp.deg2rad(alpha_deg) if traced else np.deg2rad(alpha_deg)
+    return Coupler(arm=jnp.asarray(arm), alpha=jnp.asarray(alpha))
 
 
 @once

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable
+
+import jax
 
 
 class InputError(ValueError):
@@ -17,6 +20,29 @@ def argument_error(name: str, wanted: str, got: object, remedy: str = "") -> Inp
     """``InputError`` of the form "Argument `name` must <wanted>, but got <got>.  <remedy>"."""
     sentence = f"Argument `{name}` must {wanted}, but got {got}."
     return InputError(f"{sentence} {remedy}" if remedy else sentence)
+
+
+def check_whole(name: str, value, least: int, most: int) -> None:
+    """Refuse an argument that is not a whole number from `least` to `most`.
+
+    What is traced has no value yet and passes.
+
+    Raises:
+        InputError: naming the argument.
+    """
+    if isinstance(value, jax.core.Tracer):
+        return
+    try:
+        good = not isinstance(value, bool) and least <= operator.index(value) <= most
+    except TypeError:
+        good = False
+    if not good:
+        raise argument_error(name, f"be a whole number from {least} to {most}", repr(value))
+
+
+def check_seed(seed) -> None:
+    """Refuse a seed that JAX's random streams do not take, see ``check_whole``."""
+    check_whole("seed", seed, 0, 2**63 - 1)
 
 
 def raise_all(problems: Iterable[str], heading: str = "The configuration cannot be used") -> None:

@@ -15,6 +15,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from martths_jax.runtime import check_runtime
+
 #: The ten compared pairs: name of the RMS index, name of the peak index.
 PAIRS = (
     ("J2_1", "J3_1"), ("J2_2", "J3_2"), ("J5_4", "J6_4"), ("J5_28", "J6_28"),
@@ -34,7 +36,7 @@ NAMES = (
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class IndexSums:
-    """What a run accumulates, trials on the last axis.
+    """What a run accumulates, trials on the last axis (in a ``Result`` on the first).
 
     Attributes:
         error_square, target_square: (10, T) sums of squares of the ``PAIRS``.
@@ -136,8 +138,42 @@ def peak_at_edge(sums: IndexSums) -> jax.Array:
     return xp.any((best == 0) | (best == sums.correlation.shape[0] - 1), axis=0)
 
 
+def trials_first(tree):
+    """Arrays whose last axis counts the trials, turned so that the first does."""
+    return jax.tree.map(lambda x: library(x).moveaxis(x, -1, 0), tree)
+
+
+def trials_last(tree):
+    """The inverse of ``trials_first``."""
+    return jax.tree.map(lambda x: library(x).moveaxis(x, 0, -1), tree)
+
+
+def on_host(tree):
+    """Arrays of a finished run as NumPy's; a tree that is still traced as it is."""
+    if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(tree)):
+        return tree
+    return jax.tree.map(np.asarray, tree)
+
+
+def without_value(sums: IndexSums) -> dict[str, jax.Array]:
+    """Index -> (T,) whether it has no value, because its target does not move or it overflows.
+
+    A delay has none where the actuator's target does not move.
+    """
+    xp = library(sums.error_square)
+    still = sums.target_square < np.finfo(float).tiny  # below, squares have lost their digits
+    found = {name: still[PAIRS.index(("J2_1", "J3_1")) + (name[-1] == "2")] for name in DELAYS}
+    for i, (rms_name, peak_name) in enumerate(PAIRS):
+        found[rms_name] = still[i] | ~xp.isfinite(sums.error_square[i])
+        found[peak_name] = still[i] | ~xp.isfinite(sums.error_peak[i])
+    return {name: found[name] for name in NAMES}
+
+
 def indices_of(sums: IndexSums, interpolate: bool = False) -> dict[str, jax.Array]:
-    """The 24 indices (T,) from the sums of a run; differentiable except for the delays."""
+    """The 24 indices (T,) from the sums of a run, trials on the last axis.
+
+    Differentiable; the delays only with `interpolate`, see ``indices``.
+    """
     with np.errstate(all="ignore"):  # a trial that diverged, or a target that never moves
         rms = 100 * library(sums.error_square).sqrt(sums.error_square / sums.target_square)
         peak = 100 * sums.error_peak / sums.target_peak
@@ -147,19 +183,40 @@ def indices_of(sums: IndexSums, interpolate: bool = False) -> dict[str, jax.Arra
     return {name: found[name] for name in NAMES}
 
 
+def final_indices(sums: IndexSums, lost: np.ndarray, interpolate: bool = False):
+    """The 24 indices (T,) of a finished run: NaN in trials (T,) that are `lost`, and without value.
+
+    Args:
+        sums: on the host, trials on the last axis.
+    """
+    missing = without_value(sums)
+    return {
+        name: np.where(lost | missing[name], np.nan, value)
+        for name, value in indices_of(sums, interpolate).items()
+    }
+
+
 def indices(result, *, interpolate: bool = False) -> dict[str, np.ndarray]:
     """The 24 indices of every trial.
 
     Args:
         result: what ``simulate`` returned.
-        interpolate: give J1 and J4 between the samples, by a parabola through the peak.
+        interpolate: give J1 and J4 between the samples, by the vertex of the parabola through the
+            largest cross-correlation and its neighbours.  Without it they are whole samples, as in
+            the benchmark, so that their gradient is zero everywhere and says nothing; to tune or
+            differentiate a delay, interpolate.
 
     Returns:
         Mapping from ``J1_1`` ... ``J10_27`` to arrays (trials,): J1, J4 in ms, the others in
-        percent.  Trials that diverged have NaN throughout; see ``result.status``.
+        percent.  Trials that diverged have NaN throughout, and an index whose target does not move
+        is NaN; ``result.status`` says so.  Under a JAX transformation the values are traced, with
+        whatever number or infinity the sums give in such trials.
+
+    Raises:
+        InputError: in single precision.
     """
-    found = indices_of(result.sums, interpolate)
-    if isinstance(result.sums.error_square, jax.core.Tracer):
-        return found
-    lost = np.asarray(result.lost)
-    return {name: np.where(lost, np.nan, np.asarray(value)) for name, value in found.items()}
+    check_runtime()
+    sums = trials_last(on_host(result.sums))
+    if isinstance(sums.error_square, jax.core.Tracer):
+        return indices_of(sums, interpolate)
+    return final_indices(sums, np.asarray(result.lost), interpolate)

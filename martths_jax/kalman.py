@@ -11,6 +11,7 @@ L is the *filter gain* P C' (C P C' + R)^-1; the *predictor gain* of the one-ste
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +20,7 @@ from scipy import linalg
 
 from martths_jax.design.riccati import dense_kalman_gain
 from martths_jax.errors import argument_error
+from martths_jax.runtime import check_precision
 from martths_jax.structure.modal import ModalSystem, advance, output, spread, to_dense
 
 
@@ -34,6 +36,9 @@ class KalmanFilter:
 
     model: ModalSystem
     filter_gain: jax.Array
+
+    #: Axes when all trials share the gain; one more counts them (see ``Controller``).
+    shared_axes = MappingProxyType({"filter_gain": 3})
 
     def init(self, trials: int) -> jax.Array:
         """Prediction for k = 0: the plant at rest, (2, m, T)."""
@@ -84,25 +89,41 @@ def steady_state_gains(A, B, C, q: float, r: float) -> tuple[np.ndarray, np.ndar
     return L, A @ L, P
 
 
-def design_kalman(model: ModalSystem, q: float, r: float) -> KalmanFilter:
+def design_kalman(model: ModalSystem, q, r: float) -> KalmanFilter:
     """Kalman filter of a plant.
 
     Args:
         model: nominal plant (T = 1).
-        q: process noise through the plant's input [mm^2]; may be traced.
+        q: process noise through the plant's input [mm^2], one for all trials or one a trial (T,);
+            may be traced.
         r: measurement noise a sample [mm^2].
 
     Raises:
-        InputError: if q or r is not positive and finite.
+        InputError: if q or r is not positive and finite, or no filter can be found.
     """
-    if isinstance(q, jax.core.Tracer):
-        A, B, C, _ = to_dense(model)
-        return KalmanFilter(model=model, filter_gain=dense_kalman_gain(A, B, C, q, r))
-    for name, value in (("q", q), ("r", r)):
-        if not (np.isfinite(value) and value > 0):
-            raise argument_error(name, "be positive and finite (mm^2)", value)
+    check_precision()
     A, B, C, _ = to_dense(model)
-    L, _, _ = steady_state_gains(A, B, C, q, r)
-    m = model.a.shape[1]
-    slots = np.transpose(L.reshape(m, 2, -1), (1, 0, 2))
-    return KalmanFilter(model=model, filter_gain=jnp.asarray(slots))
+    if isinstance(q, jax.core.Tracer):
+        gain = lambda one: dense_kalman_gain(A, B, C, one, r)  # noqa: E731
+        return KalmanFilter(model, jax.vmap(gain, out_axes=-1)(q) if q.ndim else gain(q))
+    for name, value, most_axes in (("q", q, 1), ("r", r, 0)):
+        try:
+            number = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            number = np.array(np.nan)
+        if number.ndim > most_axes or not np.all(np.isfinite(number) & (number > 0)):
+            raise argument_error(name, "be positive and finite (mm^2)", repr(value)[:80])
+    gains = {one: _slots(A, B, C, one, r) for one in np.unique(np.asarray(q, dtype=float))}
+    if np.ndim(q):
+        return KalmanFilter(model, jnp.asarray(np.stack([gains[one] for one in q], axis=-1)))
+    return KalmanFilter(model, jnp.asarray(gains[float(q)]))
+
+
+def _slots(A, B, C, q: float, r: float) -> np.ndarray:
+    """Filter gain (2, m, 2), slot by slot."""
+    try:
+        L, _, _ = steady_state_gains(A, B, C, q, r)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        wanted = f"give a filter's Riccati equation that can be solved, with r = {r:g} mm^2"
+        raise argument_error("q", wanted, f"{q:g} ({error})") from None
+    return np.transpose(L.reshape(len(A) // 2, 2, -1), (1, 0, 2))

@@ -8,12 +8,20 @@ stages of a sample period are such functions; nothing but time depends on it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import wraps
 from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
-from jax.experimental.xla_metadata import set_xla_metadata
+
+try:
+    from jax.experimental.xla_metadata import set_xla_metadata
+except ImportError:  # without it the compiler repeats arithmetic, which costs time and no more
+
+    def set_xla_metadata(**_):
+        return nullcontext()
+
 
 Function = TypeVar("Function", bound=Callable)
 

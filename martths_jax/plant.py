@@ -16,7 +16,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from martths_jax.errors import InputError, argument_error
+from martths_jax.errors import InputError, argument_error, check_seed, check_whole
+from martths_jax.runtime import check_precision, check_runtime
 from martths_jax.structure.modal import ModalSystem
 
 HZ = 2 * np.pi  # rad/s per Hz
@@ -33,6 +34,8 @@ SIGMA = np.array([0.055, 0.055, 0.06, 0.06, 0.05, 0.03, 0.03, 0.03, 0.03])
 #: k_ij of the nominal plant, output by row.
 NOMINAL_GAIN = np.array([[2165.2, 4.5394e6], [349.95, 1.9238e7]])
 
+#: Largest trial number: random streams tell 32 bits of them apart.
+MOST_TRIALS = 2**32 - 1
 PLANT_STREAM = 0  # separates plant draws from noise draws of the same seed
 
 
@@ -45,11 +48,14 @@ class Plants:
         draws: (T, 9) standard normal draws in the order of ``PARAMETERS``.
         trial: (T,) numbers of the trials, which also select their sensor noise.
         spread: scale on every standard deviation of Table 2 [-].
+        nominal_hz: (T, 9) zeros and poles [Hz] that the draws are counted from, as in
+            ``parameters_hz``; None for the benchmark's, ``NOMINAL_HZ``.
     """
 
     draws: jax.Array
     trial: jax.Array
     spread: jax.Array | float = 1.0
+    nominal_hz: jax.Array | None = None
 
     def __len__(self) -> int:
         return self.draws.shape[0]
@@ -59,15 +65,18 @@ class Plants:
         if isinstance(which, (int, np.integer)):
             which = [which]
         index = np.arange(len(self))[which]
-        return Plants(self.draws[index], self.trial[index], self.spread)
+        nominal = None if self.nominal_hz is None else self.nominal_hz[index]
+        return Plants(self.draws[index], self.trial[index], self.spread, nominal)
 
     @property
     def parameters_hz(self) -> jax.Array:
         """(T, 9) zeros and poles [Hz]; the frame pair's entry is the factor on the pair."""
-        return NOMINAL_HZ * (1 + SIGMA * self.spread * self.draws)
+        nominal = NOMINAL_HZ if self.nominal_hz is None else self.nominal_hz
+        return nominal * (1 + SIGMA * self.spread * self.draws)
 
     def discretise(self, dt: float) -> ModalSystem:
         """Zero-order-hold discretisation of every plant at `dt` [s]."""
+        check_precision()
         return discretise_parameters(self.parameters_hz, dt)
 
 
@@ -96,25 +105,43 @@ class IdealPlants:
         )
 
 
-def draw_plants(n: int, seed: int = 0, *, first: int = 1, spread: float = 1.0) -> Plants:
+def draw_plants(
+    n: int,
+    seed: int = 0,
+    *,
+    first: int = 1,
+    spread: float = 1.0,
+    around: Plants | None = None,
+) -> Plants:
     """Draw uncertain plants (paper, Table 2); trial i depends on (seed, i) alone.
 
     Args:
         n: how many.
-        seed: seed of the study.
+        seed: seed of the study, from 0 to 2^63 - 1.
         first: number of the first trial; trial 0 is the nominal plant by convention, so draws
             start at 1.
         spread: factor on the standard deviations [-].
+        around: one plant that they scatter about, by the relative deviations of Table 2; the
+            benchmark's nominal plant by default.
 
     Returns:
         Trials first ... first + n - 1.
+
+    Raises:
+        InputError: for a number that cannot be used, or an unstable plant.
     """
-    if n < 1:
-        raise argument_error("n", "be a whole number of at least 1", n)
+    check_runtime()
+    check_whole("n", n, 1, MOST_TRIALS)
+    check_whole("first", first, 0, MOST_TRIALS - n)
+    check_seed(seed)
+    spread = _checked_spread(spread)
     trial = jnp.arange(first, first + n)
     stream = jax.random.fold_in(jax.random.key(seed), PLANT_STREAM)
     draw = jax.vmap(lambda i: jax.random.normal(jax.random.fold_in(stream, i), (9,)))
-    return check_plants(Plants(draw(trial), trial, float(spread)))
+    nominal = None
+    if around is not None:
+        nominal = jnp.broadcast_to(one_plant("around", around).parameters_hz, (n, 9))
+    return check_plants(Plants(draw(trial), trial, spread, nominal))
 
 
 def plant_from_draws(draws, *, trial=None, spread: float = 1.0) -> Plants:
@@ -129,17 +156,65 @@ def plant_from_draws(draws, *, trial=None, spread: float = 1.0) -> Plants:
     Raises:
         InputError: for a wrong shape, a value that is not finite, or an unstable plant.
     """
-    draws = jnp.asarray(draws, dtype=float)
-    if draws.shape[-1:] != (9,) or draws.ndim not in (1, 2) or draws.size == 0:
+    draws = _rows("draws", draws)
+    trial = jnp.arange(draws.shape[0]) if trial is None else jnp.asarray(trial)
+    return check_plants(Plants(draws, trial, _checked_spread(spread)))
+
+
+def plant_from_hz(parameters_hz, *, trial=None) -> Plants:
+    """A plant of one's own from its zeros and poles; its gains keep the benchmark's static ones.
+
+    ``build_benchmark(plant=...)`` lets every controller and filter know it, and
+    ``draw_plants(n, around=...)`` draws uncertain ones about it.
+
+    Args:
+        parameters_hz: (9,) or (T, 9) zeros and poles [Hz] in the order of ``PARAMETERS``, negative
+            as the benchmark's (``NOMINAL_HZ``); the fifth is the factor on the frame's pole pair.
+        trial: (T,) trial numbers; 0, 1, ... by default.
+
+    Raises:
+        InputError: for a wrong shape, a value that is not finite, an unstable plant, or one with
+            two equal poles in a column, which has no modal form.
+    """
+    values = _rows("parameters_hz", parameters_hz)
+    for one, other in ((2, 3), (7, 8)):
+        alike = np.isclose(values[:, one], values[:, other], rtol=1e-6, atol=0)
+        if np.any(alike):
+            raise argument_error(
+                "parameters_hz", f"have another {PARAMETERS[one]} than {PARAMETERS[other]}",
+                f"{values[np.argmax(alike), one]:g} for both in row {np.argmax(alike)}",
+            )  # fmt: skip
+    trial = jnp.arange(values.shape[0]) if trial is None else jnp.asarray(trial)
+    return check_plants(Plants(jnp.zeros_like(values), trial, 1.0, values), "parameters_hz")
+
+
+def _rows(name: str, given) -> jax.Array:
+    """(T, 9) numbers from what a user gave, one plant or several."""
+    check_runtime()
+    try:
+        rows = jnp.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise argument_error(name, "be numbers", repr(given)[:80]) from None
+    if rows.shape[-1:] != (9,) or rows.ndim not in (1, 2) or rows.size == 0:
         raise argument_error(
-            "draws",
+            name,
             "have shape (9,) or (trials, 9)",
-            f"shape {draws.shape}",
+            f"shape {rows.shape}",
             f"The nine columns are {', '.join(PARAMETERS)}.",
         )
-    draws = draws.reshape(-1, 9)
-    trial = jnp.arange(draws.shape[0]) if trial is None else jnp.asarray(trial)
-    return check_plants(Plants(draws, trial, float(spread)))
+    return rows.reshape(-1, 9)
+
+
+def _checked_spread(spread):
+    if isinstance(spread, jax.core.Tracer):
+        return spread
+    try:
+        value = float(spread)
+    except (TypeError, ValueError):
+        value = float("nan")
+    if not 0 <= value < float("inf"):
+        raise argument_error("spread", "be zero or positive and finite", repr(spread))
+    return value
 
 
 def nominal_plant() -> Plants:
@@ -147,41 +222,81 @@ def nominal_plant() -> Plants:
     return plant_from_draws(np.zeros(9))
 
 
-def check_plants(plants: Plants) -> Plants:
+def one_plant(name: str, plant) -> Plants:
+    """The argument `name` itself, if it is a batch of one plant with known zeros and poles.
+
+    Raises:
+        InputError: if it is not.
+    """
+    if not isinstance(plant, Plants) or len(plant) != 1:
+        got = f"{len(plant)} plants" if isinstance(plant, Plants) else type(plant).__name__
+        raise argument_error(name, "be one plant", got, "Use plant_from_hz(nine zeros and poles).")
+    if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(plant)):
+        raise argument_error(
+            name, "be known when the benchmark is built", "a traced one", "Build it outside of jit."
+        )
+    return check_plants(plant)
+
+
+def lowest_rate(parameters_hz) -> float:
+    """Lowest sampling rate of a plant [Hz]: twice its fastest pole, whatever that pole's damping.
+
+    Args:
+        parameters_hz: (9,) zeros and poles as in ``Plants.parameters_hz``.
+    """
+    values = np.abs(np.asarray(parameters_hz))
+    return 2 * max(*values[[2, 3, 7, 8]], abs(FRAME_POLE_HZ) * values[4])
+
+
+def check_plants(plants: Plants, name: str = "draws") -> Plants:
     """Refuse draws that are not finite and plants with a pole that is not in the left half-plane.
+
+    Args:
+        plants: the batch.
+        name: of the argument that gave it.
 
     Raises:
         InputError: naming the first such trial and parameter.
     """
-    if isinstance(plants.draws, jax.core.Tracer):
+    if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(plants)):
         return plants
-    draws, values = np.asarray(plants.draws), np.asarray(plants.parameters_hz)
-    bad = np.argwhere(~np.isfinite(draws))
+    given = plants.draws if plants.nominal_hz is None else plants.nominal_hz + plants.draws
+    given, values = np.asarray(given), np.asarray(plants.parameters_hz)
+    bad = np.argwhere(~np.isfinite(given))
     if bad.size:
         row, column = bad[0]
         raise argument_error(
-            "draws", "be finite", f"{draws[row, column]} for {PARAMETERS[column]} in row {row}"
+            name, "be finite", f"{given[row, column]} for {PARAMETERS[column]} in row {row}"
         )
     poles = [2, 3, 4, 7, 8]
     unstable = np.argwhere(values[:, poles] * np.sign(NOMINAL_HZ[poles]) <= 0)
     if unstable.size:
         row, column = unstable[0][0], poles[unstable[0][1]]
+        remedy = f"keep the draw above {-1 / (SIGMA[column] * float(plants.spread)):.1f}."
+        if name != "draws":
+            remedy = "poles are negative, the frame pair's factor is positive."
         raise InputError(
-            f"Argument `draws` must give stable plants, but row {row} moves {PARAMETERS[column]} "
-            f"to {values[row, column]:.3g} (nominal {NOMINAL_HZ[column]:g}); keep the draw above "
-            f"{-1 / (SIGMA[column] * float(plants.spread)):.1f}."
+            f"Argument `{name}` must give stable plants, but row {row} moves {PARAMETERS[column]} "
+            f"to {values[row, column]:.3g} (nominal {NOMINAL_HZ[column]:g}); {remedy}"
         )
+    still = np.argwhere(values == 0)
+    if still.size:
+        row, column = still[0]
+        raise argument_error(
+            name, "give zeros other than 0 Hz, which would take away the static gain",
+            f"{PARAMETERS[column]} = 0 in row {row}",
+        )  # fmt: skip
     return plants
 
 
-def _factors(parameters_hz: jax.Array):
+def _factors(parameters_hz: jax.Array, xp=jnp):
     """Zeros, real poles, frame pole [rad/s] and rescaled gains of a batch of plants.
 
     Returns:
         zeros: per output and column, list of (T,) arrays; poles: per column (p1, p2); frame: (T,)
         complex; gain: (2, 2, T), rescaled so that the DC gain stays nominal.
     """
-    s = jnp.moveaxis(jnp.asarray(parameters_hz), -1, 0) * HZ
+    s = xp.moveaxis(xp.asarray(parameters_hz), -1, 0) * HZ
     z1, z2, p1, p2, frame, z12, z22, p3, p4 = s
     frame = frame * FRAME_POLE_HZ
     zeros = [[(z1, z2), (z12,)], [(z1, z2), (z22,)]]
@@ -196,7 +311,7 @@ def _factors(parameters_hz: jax.Array):
         for j in range(2):
             dc = NOMINAL_GAIN[i, j] * np.prod([-z for z in nominal_zeros[i][j]])
             dc = dc / (np.prod([-p for p in nominal_poles[j]]) * pair)
-            numerator = jnp.prod(jnp.stack([-z for z in zeros[i][j]]), axis=0)
+            numerator = xp.prod(xp.stack([-z for z in zeros[i][j]]), axis=0)
             row.append(dc * poles[j][0] * poles[j][1] * (frame * frame.conj()).real / numerator)
         gain.append(row)
     return zeros, poles, frame, gain
@@ -210,19 +325,20 @@ def frequency_response(parameters_hz, frequency_hz) -> jax.Array:
         frequency_hz: (F,) frequencies [Hz].
 
     Returns:
-        (F, 2, 2, T) complex response, mm a mm.
+        (F, 2, 2, T) complex response, mm a mm; by NumPy, without compiling, for NumPy's arrays.
     """
-    zeros, poles, frame, gain = _factors(parameters_hz)
-    s = 2j * jnp.pi * jnp.asarray(frequency_hz)[:, None]
+    xp = np if isinstance(parameters_hz, np.ndarray) else jnp
+    zeros, poles, frame, gain = _factors(parameters_hz, xp)
+    s = 2j * xp.pi * xp.asarray(frequency_hz)[:, None]
 
     def entry(i, j):
-        numerator = gain[i][j] * jnp.ones_like(s)
+        numerator = gain[i][j] * xp.ones_like(s)
         for z in zeros[i][j]:
             numerator = numerator * (s - z)
         p, q = poles[j]
         return numerator / ((s - p) * (s - q) * (s - frame) * (s - frame.conj()))
 
-    return jnp.stack([jnp.stack([entry(i, j) for j in range(2)], 1) for i in range(2)], 1)
+    return xp.stack([xp.stack([entry(i, j) for j in range(2)], 1) for i in range(2)], 1)
 
 
 def continuous_modes(parameters_hz: jax.Array):

@@ -8,7 +8,8 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 
-from martths_jax.errors import argument_error
+from martths_jax.errors import argument_error, check_seed
+from martths_jax.runtime import check_precision
 
 NOISE_STREAM = 1  # separates noise draws from plant draws of the same seed
 BLOCK = 1024  # samples drawn from one key, so that a longer record only adds to a shorter one
@@ -32,8 +33,14 @@ class SensorNoise:
     seed: int = 0
 
     def __post_init__(self):
-        if not (self.power >= 0 and self.power < float("inf")):
-            raise argument_error("power", "be zero or positive and finite (mm^2 s)", self.power)
+        try:
+            good = 0 <= self.power < float("inf")
+        except TypeError:
+            good = False
+        if not good:
+            wanted = "be zero or positive and finite (mm^2 s)"
+            raise argument_error("power", wanted, repr(self.power))
+        check_seed(self.seed)
 
     @property
     def channels(self) -> int:
@@ -55,6 +62,7 @@ class SensorNoise:
         Returns:
             (N, channels, T) noise [mm].
         """
+        check_precision()
         unit = unit_noise(self.seed, trial, samples, self.channels)
         return unit * jnp.sqrt(self.variance(fs))
 

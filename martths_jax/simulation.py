@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -17,10 +17,12 @@ from martths_jax import checks, loop
 from martths_jax import watch as watching
 from martths_jax.benchmark import Benchmark
 from martths_jax.controllers import Controller
-from martths_jax.indices import IndexSums, peak_at_edge
+from martths_jax.controllers.check import check_controller
+from martths_jax.indices import IndexSums, peak_at_edge, trials_first
 from martths_jax.motions import Motion
 from martths_jax.plant import Plants
-from martths_jax.runtime import compiler_options
+from martths_jax.result import Result
+from martths_jax.runtime import check_runtime, compiler_options
 from martths_jax.sensors import SensorNoise, unit_noise
 from martths_jax.structure.modal import respond
 from martths_jax.watch import Status
@@ -34,55 +36,6 @@ ROOMS = (2**12, 2**16)
 FEW = 8
 #: Ranges of the cross-correlations [samples at 1024 Hz], tried in turn until the peak is inside.
 LAG_RANGES = ((6, 13), (32, 96), (256, 512))
-
-
-@dataclass(frozen=True)
-class Result:
-    """Outcome of a batch of trials.
-
-    Attributes:
-        sums: what ``indices`` turns into the 24 indices.
-        watch: first samples of saturation, runaway and non-finite values.
-        signals: (T, N, ...) histories if asked for, else empty: ``x_a``, ``x_m``, ``x_hat``, ``u``
-            (T, N, 2) [mm]; ``num`` (T, N, 6) numerical and ``est`` (T, N, 2) estimated motion
-            [m, rad]; ``force`` (T, N, 3) [N, N m]; whatever the controller adds.
-        reference: (N, 6) response of the reference structure [m, rad], as ``num``.
-        trial: (T,) trial numbers.
-        fs: sampling rate [Hz].
-        motion, controller: names.
-    """
-
-    sums: IndexSums
-    watch: watching.Watch
-    signals: dict[str, Any]
-    reference: Any
-    trial: Any
-    fs: float
-    motion: str
-    controller: str
-
-    @property
-    def status(self) -> np.ndarray:
-        """(T,) ``Status`` of every trial."""
-        return np.asarray(watching.status_of(self.watch))
-
-    @property
-    def lost(self) -> np.ndarray:
-        """(T,) whether a trial diverged, so that it has no indices."""
-        return self.status >= Status.DIVERGED
-
-    def describe(self, position: int) -> str:
-        """What happened in the trial at `position`: its status, which actuator, from when."""
-        line = watching.describe(self.watch, range(len(self.trial))[position], self.fs)
-        return f"Trial {int(np.asarray(self.trial)[position])} {line}"
-
-    def __str__(self) -> str:
-        counts = {s.name.lower(): int(np.sum(self.status == s)) for s in Status}
-        ended = ", ".join(f"{n} {name}" for name, n in counts.items() if n)
-        return (
-            f"{self.controller} on {self.motion}: {len(self.trial)} trials at {self.fs:g} Hz, "
-            f"{self.reference.shape[0]} samples; {ended}"
-        )
 
 
 def reference_response(benchmark: Benchmark, acceleration: jax.Array) -> jax.Array:
@@ -117,12 +70,20 @@ def simulate(
         ``Result``; pass it to ``indices``.
 
     Raises:
-        InputError: naming every argument that cannot be used.
+        InputError: naming every argument that cannot be used, or the rule of the protocol that the
+            controller breaks; in single precision, or in a process that was forked.
+
+    Warns:
+        UserWarning: if all plants are clearly others than the one that the controller's filter was
+            designed for (``plant_notice``).
 
     Inside ``jax.grad`` or another transformation the batch runs as one block and stays traced.
     """
+    check_runtime()
     checks.check_simulation(benchmark, controller, plants, motion, noise, keep, progress)
     controller, per_trial = prepare(controller, benchmark, len(plants))
+    if told := checks.plant_notice(benchmark, controller, plants):
+        warnings.warn(told, stacklevel=2)
     noise = SensorNoise() if noise is None else noise
     ground = jnp.asarray(motion.acceleration)
     reference = reference_response(benchmark, ground)
@@ -132,6 +93,7 @@ def simulate(
     else:
         sums, watch, signals = run_blocks(setup, plants, noise, keep, progress)
         reference = np.asarray(reference)
+    sums, watch = trials_first((sums, watch))
     return Result(
         sums, watch, signals, reference, plants.trial, benchmark.fs, motion.name, controller.name
     )
@@ -157,16 +119,21 @@ class Setup:
 
 
 def prepare(controller, benchmark: Benchmark, trials: int) -> tuple[Controller, tuple[bool, ...]]:
-    """Controller ready to run, and which of its leaves differ from trial to trial.
+    """Controller ready to run, checked, and which of its leaves differ from trial to trial.
 
     A sequence of controllers, one a trial, becomes one controller whose differing leaves are
     stacked on a last axis.
+
+    Raises:
+        InputError: a controller breaks the protocol, or holds values for another number of trials.
     """
     if isinstance(controller, Controller):
         ready = controller.prepare(benchmark)
-        return ready, (False,) * len(jax.tree.leaves(ready))
+        return ready, check_controller(ready, benchmark.dt, trials)
     distinct = {id(c): c for c in checks.check_sequence(controller, trials)}
     ready = {key: c.prepare(benchmark) for key, c in distinct.items()}
+    for one in ready.values():
+        check_controller(one, benchmark.dt, 1)
     leaves, trees = zip(*(jax.tree.flatten(c) for c in ready.values()), strict=True)
     checks.check_alike(trees)
     column = {key: i for i, key in enumerate(ready)}

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import jax
@@ -26,6 +27,7 @@ from martths_jax.controllers.adfc import ADFC, TAPS, regress
 from martths_jax.errors import argument_error
 from martths_jax.loop import initial_state, sample_period
 from martths_jax.plant import Plants
+from martths_jax.runtime import check_runtime
 from martths_jax.structure.modal import spread
 
 
@@ -43,6 +45,7 @@ class FrozenFeedforward(Controller):
     estimator: Any = None
 
     name = "frozen"
+    shared_axes = MappingProxyType({"coefficients": 2})
 
     def init(self, trials):
         return ((jnp.zeros(trials),) * (TAPS - 1),) * 2
@@ -56,6 +59,7 @@ class FrozenFeedforward(Controller):
 
 def frozen_adfc(benchmark: Benchmark, adfc: ADFC, coefficients) -> FrozenFeedforward:
     """The loop's controller when `adfc` stops adapting with the given (8, 2[, T]) coefficients."""
+    check_runtime()
     ready = adfc.prepare(benchmark)
     return FrozenFeedforward(jnp.asarray(coefficients, dtype=float), estimator=ready.estimator)
 
@@ -76,6 +80,7 @@ def linear_loop(
     Returns:
         (T, n, n) A, or with `opened` the tuple A, B (T, n, 2), C (T, 2, n).
     """
+    check_runtime()
     if isinstance(controller, ADFC):
         raise argument_error(
             "controller", "be linear and time-invariant", "an adaptive ADFC",

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from martths_jax.benchmark import VOLT_LIMIT, command_volts
-from martths_jax.indices import library
+from martths_jax.indices import IndexSums, library, without_value
 
 #: A command or stroke beyond this is a loop that has run away: the largest stroke in the study is
 #: about a tenth of it, and the coupler has no position for strokes 254 mm apart.
@@ -22,13 +22,16 @@ class Status(IntEnum):
     """How a trial ended, in order of gravity.
 
     SATURATED: a valve was asked for more than its limit; the run is whole and has indices (the
-    valves are only monitored).  DIVERGED: a command or stroke left its range.  NONFINITE: a stroke
-    turned into NaN or infinity without having left its range before.  The last two are *lost*:
-    their indices are NaN.
+    valves are only monitored).  UNDEFINED: the run is whole, but an index has no value (it is NaN),
+    since its target does not move or is too small to be squared.  DIVERGED: a command or stroke
+    left its range.  NONFINITE: a stroke turned into NaN or infinity without having left its range
+    before.  The last two are *lost*: their indices are NaN, and their numbers the only ones from
+    ``DIVERGED`` on.
     """
 
     OK = 0
     SATURATED = 1
+    UNDEFINED = -1
     DIVERGED = 2
     NONFINITE = 3
 
@@ -37,6 +40,8 @@ class Status(IntEnum):
 @dataclass(frozen=True)
 class Watch:
     """First samples at which something happened, ``NEVER`` where it did not; T trials.
+
+    The trials are the last axis here, in the loop; in a ``Result`` they are the first.
 
     Attributes:
         saturated: (2, T) each valve asks for more than its limit.
@@ -88,8 +93,13 @@ def update(watch: Watch, k: jax.Array, valid: jax.Array, signals: dict[str, jax.
     )
 
 
-def status_of(watch: Watch) -> jax.Array:
-    """(T,) ``Status`` of each trial."""
+def status_of(watch: Watch, sums: IndexSums | None = None) -> jax.Array:
+    """(T,) ``Status`` of each trial, trials on the last axis.
+
+    Args:
+        watch: of a finished run.
+        sums: of the same run; without them no trial is ``UNDEFINED``.
+    """
     xp = library(*vars(watch).values())
     happened = lambda first: xp.any(first != NEVER, axis=0)  # noqa: E731
     runaway = happened(watch.command) | happened(watch.stroke)
@@ -97,33 +107,29 @@ def status_of(watch: Watch) -> jax.Array:
     first_bad = xp.minimum(xp.min(watch.command, axis=0), xp.min(watch.stroke, axis=0))
     at_once = happened(watch.nonfinite) & (xp.min(watch.nonfinite, axis=0) <= first_bad)
     status = xp.where(happened(watch.saturated), Status.SATURATED, Status.OK)
+    if sums is not None:
+        undefined = xp.any(xp.stack(list(without_value(sums).values())), axis=0)
+        status = xp.where(undefined, Status.UNDEFINED, status)
     status = xp.where(runaway, Status.DIVERGED, status)
     return xp.where(at_once, Status.NONFINITE, status)
 
 
-def describe(watch: Watch, trial: int, fs: float) -> str:
+def describe(watch: Watch, sums: IndexSums, trial: int, fs: float) -> str:
     """One line about a trial: its status, and what happened first, where and when.
 
     Args:
-        watch: of a finished run.
+        watch, sums: of a finished run, trials on the last axis.
         trial: position in the batch.
         fs: sampling rate [Hz].
     """
-    status = Status(int(np.asarray(status_of(watch))[trial]))
+    status = Status(int(np.asarray(status_of(watch, sums))[trial]))
     column = lambda name: np.asarray(getattr(watch, name))[..., trial]  # noqa: E731
     parts = []
     if status >= Status.DIVERGED:
-        limit = f"left +-{RUNAWAY_MM:g} mm or became NaN"
-        causes = [("command", limit), ("stroke", limit), ("nonfinite", "is not finite")]
-        if status == Status.NONFINITE:
-            causes.reverse()
-        # `min` keeps the first of equals: the cause before its consequence.
-        first, i, name, what = min(
-            ((column(name)[i], i, name, what) for name, what in causes for i in range(2)),
-            key=lambda event: event[0],
-        )
-        signal = "command u" if name == "command" else "measured stroke x_m"
-        parts.append(f"{signal} of actuator {i + 1} {what} at {_when(first, fs)}")
+        parts.append(_first_cause(column, status, fs))
+    if status == Status.UNDEFINED:
+        names = [n for n, missing in without_value(sums).items() if np.asarray(missing)[trial]]
+        parts.append(f"{', '.join(names)} without a value, since the target does not move")
     for i in range(2):
         first = column("saturated")[i]
         if first != NEVER:
@@ -134,6 +140,21 @@ def describe(watch: Watch, trial: int, fs: float) -> str:
     if column("held"):
         parts.append(f"{int(column('held'))} fits not used")
     return f"{status.name.lower()}: {'; '.join(parts)}" if parts else status.name.lower()
+
+
+def _first_cause(column, status: Status, fs: float) -> str:
+    """What took a trial away: the first event of its watch, whose arrays `column` picks."""
+    limit = f"left +-{RUNAWAY_MM:g} mm or became NaN"
+    causes = [("command", limit), ("stroke", limit), ("nonfinite", "is not finite")]
+    if status == Status.NONFINITE:
+        causes.reverse()
+    # `min` keeps the first of equals: the cause before its consequence.
+    first, i, name, what = min(
+        ((column(name)[i], i, name, what) for name, what in causes for i in range(2)),
+        key=lambda event: event[0],
+    )
+    signal = "command u" if name == "command" else "measured stroke x_m"
+    return f"{signal} of actuator {i + 1} {what} at {_when(first, fs)}"
 
 
 def _when(sample: float, fs: float) -> str:

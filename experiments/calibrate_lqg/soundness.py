@@ -48,7 +48,7 @@ def main() -> None:
         )
         for motion in motions:
             result = simulate(benchmark, controller, plants, motion)
-            volts = np.max(np.asarray(result.watch.volt_peak), axis=0)
+            volts = np.max(np.asarray(result.watch.volt_peak), axis=1)
             found = {n: np.asarray(v)[~result.lost] for n, v in indices(result).items()}
             print(
                 f"  {motion.name}: {result.lost.sum()} of {len(plants)} lost, "

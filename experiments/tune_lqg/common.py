@@ -55,7 +55,7 @@ def run(benchmark, controllers: list[Controller], plants, ground) -> dict[str, n
     found = {k: np.where(result.lost, np.nan, np.asarray(v)) for k, v in indices(result).items()}
     found |= {g: np.mean([found[k] for k in members], axis=0) for g, members in GROUPS.items()}
     found["lost"] = result.lost.astype(float)
-    found["volts"] = np.max(np.asarray(result.watch.volt_peak), axis=0)
+    found["volts"] = np.max(np.asarray(result.watch.volt_peak), axis=1)
     return {k: v.reshape(n, each) for k, v in found.items()}
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 from typing import Annotated
 
@@ -12,6 +14,7 @@ from martths_jax import __version__
 from martths_jax.cli import figures, motions, nominal, sensitivity, study, sweep, tune
 from martths_jax.cli.console import accept_any_text, error_console
 from martths_jax.errors import InputError
+from martths_jax.runtime import check_devices
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -49,7 +52,7 @@ def _root(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    pass
+    check_devices()
 
 
 def main() -> None:
@@ -62,6 +65,8 @@ def main() -> None:
     except MemoryError as error:
         _fail(f"There is not enough memory ({error or 'nothing more can be taken'}).")
     except KeyboardInterrupt:
+        # A second one, while Python and JAX clean up, ends the process at once and without a word.
+        signal.signal(signal.SIGINT, lambda *_: os._exit(130))
         error_console.print("Interrupted; no half-written file was left.")
         sys.exit(130)
 

@@ -16,8 +16,8 @@ error_console = Console(stderr=True)
 
 #: Signs for those that a console's encoding lacks, as wide as these where tables hold them.
 PLAIN = {"–": "-", "—": "-", "−": "-", "…": "...", "×": "x", "·": ".", "±": "+-", "°": "deg",
-         "’": "'", "‘": "'", "“": '"', "”": '"', "µ": "u", "λ": "l", "√": "sqrt",
-         "ß": "ss", "ø": "o"}  # fmt: skip
+         "’": "'", "‘": "'", "“": '"', "”": '"', "µ": "u", "ß": "ss", "ø": "o",
+         "λ": "l", "√": "sqrt"}  # fmt: skip
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:

@@ -19,7 +19,7 @@ Motions = Annotated[
     typer.Option(
         "--motion",
         help="Built-in motion (elcentro-like, kobe-like, morganhill-like), name under --records, "
-        "or path of a .mat, .AT2 or .csv file; may be repeated.",
+        "or path of a file (.mat, .npy, .AT2, .V2, .smc, .csv ...); may be repeated.",
     ),
 ]
 Records = Annotated[
@@ -45,6 +45,18 @@ Units = Annotated[
     str | None,
     typer.Option("--units", help="Unit of files that do not say theirs: g, m/s2 or cm/s2."),
 ]
+Dt = Annotated[
+    float | None,
+    typer.Option("--dt", metavar="S", help="Time step of files that do not say theirs [s]."),
+]
+Variable = Annotated[
+    str | None,
+    typer.Option(
+        "--variable",
+        metavar="NAME|NUMBER",
+        help="Column, channel or array of files that hold several.",
+    ),
+]
 Resample = Annotated[
     str,
     typer.Option("--resample", help="linear (the benchmark's) or bandlimited."),
@@ -60,6 +72,8 @@ def load_all(
     units: str | None = None,
     resample: str = "linear",
     fs: float = 1024,
+    dt: float | None = None,
+    variable: str | None = None,
 ) -> list[Motion]:
     """Every motion of a command, from the values of its options."""
     return [
@@ -72,6 +86,8 @@ def load_all(
             pga=pga,
             sa=sa,
             resample=resample,
+            dt=dt,
+            variable=variable,
         )
         for motion in motions
     ]

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.progress import Progress
 
 from martths_jax.cli.console import console
-from martths_jax.cli.motion_options import Records, Units
+from martths_jax.cli.motion_options import Dt, Records, Units, Variable
 from martths_jax.motions import MotionInfo, available_motions, load_record, write_ensemble
 from martths_jax.motions.figure import draw_motion
 from martths_jax.motions.overview import FIRST_MODE
@@ -33,10 +33,19 @@ COLUMNS = (
 
 
 @app.callback(invoke_without_command=True)
-def motions(context: typer.Context, records: Records = None, units: Units = None) -> None:
+def motions(
+    context: typer.Context,
+    records: Records = None,
+    units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
+) -> None:
     """List the motions there are, unscaled, with their intensity measures."""
     if context.invoked_subcommand is None:
-        console.print(_table(available_motions(records, units)))
+        found = available_motions(records, units, dt, variable)
+        console.print(_table(found))
+        for notice in (notice for info in found for notice in info.notices):
+            console.print(f"[yellow]Note:[/] {escape(notice)}", highlight=False, soft_wrap=True)
 
 
 def _table(found: list[MotionInfo]) -> ScreenTable:
@@ -54,9 +63,14 @@ def show(
     out: Annotated[Path, typer.Option("--out", help="Picture to write: .png, .pdf or .svg.")],
     records: Records = None,
     units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
 ) -> None:
     """Draw a motion's acceleration, Arias build-up and response spectrum."""
-    draw_motion(load_record(name, records=records, units=units), out)
+    record = load_record(name, records=records, units=units, dt=dt, variable=variable)
+    for notice in record.notices:
+        console.print(f"[yellow]Note:[/] {escape(notice)}", highlight=False, soft_wrap=True)
+    draw_motion(record, out)
     console.print(f"Wrote {escape(str(out))}", soft_wrap=True)
 
 
@@ -70,6 +84,8 @@ def make(
     seed: Annotated[int, typer.Option("--seed", help="Seed of the ensemble.")] = 0,
     records: Records = None,
     units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
 ) -> None:
     """Make different motions compatible with one target spectrum, intensity and duration."""
     with Progress(console=console, transient=True) as bar:
@@ -81,6 +97,8 @@ def make(
             seed=seed,
             records=records,
             units=units,
+            dt=dt,
+            variable=variable,
             progress=lambda done, total: bar.update(task, completed=done),
         )
     accepted = sum(line["accepted"] for line in lines)

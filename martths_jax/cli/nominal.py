@@ -8,11 +8,13 @@ from typing import Annotated
 
 import numpy as np
 import typer
+from rich.markup import escape
 
 from martths_jax import published
 from martths_jax.benchmark import Benchmark, build_benchmark
-from martths_jax.cli.console import console, progress
+from martths_jax.cli.console import console, error_console, progress
 from martths_jax.cli.motion_options import (
+    Dt,
     Motions,
     Pga,
     Records,
@@ -20,6 +22,7 @@ from martths_jax.cli.motion_options import (
     Sa,
     Scale,
     Units,
+    Variable,
     load_all,
 )
 from martths_jax.controllers import Controller
@@ -98,6 +101,8 @@ def run(
     pga: Pga = None,
     sa: Sa = None,
     units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
     resample: Resample = "linear",
     mat: Annotated[
         bool, typer.Option("--mat", help="Write all of it as a MATLAB file NAME.mat too.")
@@ -107,13 +112,15 @@ def run(
 
     Writes, for each motion, NAME_signals.npz (time histories; strokes and commands in mm, motion in
     m and rad, force in N and N m), NAME_indices.csv and NAME_run.json (status and settings).  In
-    NAME.mat the signals are variables, indices and settings the structs indices and about.
+    NAME.mat the signals are variables, indices and settings the structs indices and about.  A trial
+    that diverges has no indices: its files are written all the same, and the exit code is 1.
     """
-    motions = load_all(motion, records, scale, pga, sa, units, resample, fs)
+    motions = load_all(motion, records, scale, pga, sa, units, resample, fs, dt, variable)
     benchmark = build_benchmark(fs, integrator)
     drive, chosen = build_controller(controller, benchmark)
     plants = nominal_plant() if trial == 0 else draw_plants(1, seed, first=trial)
     about = {"trial": trial, "seed": seed, "integrator": integrator, "settings": chosen}
+    lost = []
     with progress(f"{drive.name}, trial {trial}", len(motions)) as tell:
         for done, one in enumerate(motions, 1):
             result = simulate(benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True)
@@ -122,8 +129,14 @@ def run(
                 console.print(f"[yellow]Note:[/] {notice}", highlight=False)
             console.print(str(result), highlight=False)
             _print_indices(result)
+            if result.lost[0]:
+                lost.append(f"{result.controller} on {one.name}: {result.describe(0)}")
             tell(done)
     console.print(f"Saved in {out}", highlight=False)
+    if lost:
+        for line in lost:
+            error_console.print(f"[bold red]Diverged:[/] {escape(line)}.", highlight=False)
+        raise typer.Exit(1)
 
 
 def _save_run(out: Path, motion, name: str, result, settings: dict, mat: bool) -> None:
@@ -143,7 +156,7 @@ def _save_run(out: Path, motion, name: str, result, settings: dict, mat: bool) -
         "fs": result.fs,
         "controller": name,
         "status": result.describe(0),
-        "volt_peak": np.asarray(result.watch.volt_peak)[:, 0].tolist(),
+        "volt_peak": np.asarray(result.watch.volt_peak)[0].tolist(),
     }
     with atomic(out / f"{stem}_signals.npz") as part:
         np.savez_compressed(part, **signals)
@@ -181,6 +194,9 @@ def table4(
     ] = None,
     seed: Seed = 0,
     scale: Scale = None,
+    units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
 ) -> None:
     """The 48 numbers of Table 4 (24 indices, LQG and ADFC, nominal plant) beside those in print.
 
@@ -190,7 +206,7 @@ def table4(
     names = motion or default_motions(records)
     if not names:
         raise argument_error("--motion", "name at least one motion", "none")
-    motions = load_all(names, records, scale)
+    motions = load_all(names, records, scale, units=units, dt=dt, variable=variable)
     benchmark = build_benchmark()
     with progress("Table 4", 2 * len(motions)) as tell:
         found = compare_with_table4(benchmark, motions, noise=SensorNoise(seed=seed), progress=tell)

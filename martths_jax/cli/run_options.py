@@ -33,6 +33,10 @@ Devices = Annotated[
 Memory = Annotated[
     float | None, typer.Option("--memory", help="Bound on the memory of the noise [GB].")
 ]
+AllowMixed = Annotated[
+    bool,
+    typer.Option("--allow-mixed", help="Mix results of machines whose last digits differ."),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")]
 
 

@@ -9,8 +9,19 @@ import typer
 from rich.markup import escape
 
 from martths_jax.cli.console import console
-from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
+from martths_jax.cli.motion_options import (
+    Dt,
+    Motions,
+    Pga,
+    Records,
+    Resample,
+    Sa,
+    Scale,
+    Units,
+    Variable,
+)
 from martths_jax.cli.run_options import (
+    AllowMixed,
     Config,
     Controllers,
     Devices,
@@ -50,6 +61,8 @@ def sensitivity(
     pga: Pga = None,
     sa: Sa = None,
     units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
     resample: Resample = None,
     index: Annotated[
         list[str] | None,
@@ -66,13 +79,14 @@ def sensitivity(
     figures: Figures = True,
     devices: Devices = None,
     memory_gb: Memory = None,
+    allow_mixed: AllowMixed = False,
     quiet: Quiet = False,
 ) -> None:
     """What drives each index: Sobol' indices of plant parameters, noise and motion."""
     given = given_settings(
         motions, motion_list, trials=trials, seed=seed, controllers=controllers, records=records,
-        scale=scale, pga=pga, sa=sa, units=units, resample=resample, out=out, devices=devices,
-        memory_gb=memory_gb,
+        scale=scale, pga=pga, sa=sa, units=units, dt=dt, variable=variable, resample=resample,
+        out=out, devices=devices, memory_gb=memory_gb,
     )  # fmt: skip
     if devices is not None and devices > 0:
         set_devices(devices)
@@ -83,6 +97,7 @@ def sensitivity(
             reporter=reporter_for(quiet),
             fresh=fresh,
             figures=figures,
+            allow_mixed=allow_mixed,
             command_line=command_line(),
         )
     except KeyboardInterrupt:

@@ -10,8 +10,19 @@ import typer
 from rich.markup import escape
 
 from martths_jax.cli.console import console, error_console
-from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
+from martths_jax.cli.motion_options import (
+    Dt,
+    Motions,
+    Pga,
+    Records,
+    Resample,
+    Sa,
+    Scale,
+    Units,
+    Variable,
+)
 from martths_jax.cli.run_options import (
+    AllowMixed,
     Devices,
     Quiet,
     reporter_for,
@@ -22,7 +33,7 @@ from martths_jax.cli.run_options import (
 from martths_jax.errors import InputError, argument_error
 from martths_jax.study import Study, merge_runs, open_study, run_study
 from martths_jax.study.config import make_config, read_toml
-from martths_jax.study.distributed import join
+from martths_jax.study.distributed import JOIN_TIMEOUT, LOST_TIMEOUT, join
 from martths_jax.study.export import export_plants, study_signals, write_csv, write_mat
 from martths_jax.study.provenance import command_line
 from martths_jax.study.template import write_template
@@ -56,6 +67,8 @@ def study(
     pga: Pga = None,
     sa: Sa = None,
     units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
     resample: Resample = None,
     draws: Annotated[
         str | None, typer.Option("--draws", help="independent, lhs or sobol [independent].")
@@ -99,13 +112,21 @@ def study(
     process_id: Annotated[
         int | None, typer.Option("--process-id", help="Which of them this is, from 0.")
     ] = None,
+    join_timeout: Annotated[
+        float, typer.Option("--join-timeout", help="Longest wait for the other processes [s].")
+    ] = JOIN_TIMEOUT,
+    lost_timeout: Annotated[
+        float, typer.Option("--lost-timeout", help="A machine silent for longer is lost [s].")
+    ] = LOST_TIMEOUT,
+    allow_mixed: AllowMixed = False,
     quiet: Quiet = False,
 ) -> None:
     """Run controllers x motions x uncertain plants; resumes and extends what is in the folder."""
     given = {
         "trials": trials, "seed": seed, "controllers": words(controllers), "motions":
         motions or None, "records": records, "scale": scale, "pga": pga, "sa": sa, "units": units,
-        "resample": resample, "draws": draws, "plants": plants, "plants_as": plants_as,
+        "dt": dt, "variable": variable, "resample": resample, "draws": draws, "plants": plants,
+        "plants_as": plants_as,
         "out": out, "keep": trial_list(keep), "signals": signals, "devices": devices,
         "memory_gb": memory_gb, "max_failed": max_failed,
     }  # fmt: skip
@@ -114,13 +135,14 @@ def study(
     if chosen.devices is not None:
         set_devices(chosen.devices)
     share = _share(shard)
-    together = distributed or any(x is not None for x in (coordinator, num_processes, process_id))
-    if together:
+    together = None
+    if distributed or any(x is not None for x in (coordinator, num_processes, process_id)):
         if share is not None:
             raise InputError(
                 "Options --shard and --coordinator or --distributed exclude each other."
             )
-        share = join(coordinator, num_processes, process_id)
+        together = join(coordinator, num_processes, process_id, join_timeout, lost_timeout)
+        share = together.share
     try:
         done = run_study(
             chosen,
@@ -128,6 +150,7 @@ def study(
             fresh=fresh,
             share=share,
             together=together,
+            allow_mixed=allow_mixed,
             command_line=command_line(),
         )
     except KeyboardInterrupt:
@@ -135,7 +158,7 @@ def study(
         raise
     if done is not None:
         _show(done, quiet, chosen.max_failed)
-    elif not together and not quiet:
+    elif together is None and not quiet:
         console.print(
             f"Share {shard} is done; when all are: martths merge {escape(chosen.out)}",
             highlight=False, soft_wrap=True,
@@ -159,6 +182,7 @@ def merge(
     records: Records = None,
     signals: Annotated[bool, typer.Option("--signals/--no-signals")] = True,
     keep: Keep = None,
+    allow_mixed: AllowMixed = False,
     quiet: Quiet = False,
 ) -> None:
     """Join the shares that --shard ran into one study."""
@@ -168,6 +192,7 @@ def merge(
         records=None if records is None else str(records),
         signals=signals,
         keep=trial_list(keep) or (),
+        allow_mixed=allow_mixed,
         reporter=reporter_for(quiet),
     )
     _show(done, quiet)

@@ -9,8 +9,19 @@ import typer
 from rich.markup import escape
 
 from martths_jax.cli.console import console
-from martths_jax.cli.motion_options import Motions, Pga, Records, Resample, Sa, Scale, Units
+from martths_jax.cli.motion_options import (
+    Dt,
+    Motions,
+    Pga,
+    Records,
+    Resample,
+    Sa,
+    Scale,
+    Units,
+    Variable,
+)
 from martths_jax.cli.run_options import (
+    AllowMixed,
     Config,
     Controllers,
     Devices,
@@ -70,6 +81,8 @@ def sweep(
     pga: Pga = None,
     sa: Sa = None,
     units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
     resample: Resample = None,
     index: Annotated[
         list[str] | None,
@@ -86,6 +99,7 @@ def sweep(
     figures: Figures = True,
     devices: Devices = None,
     memory_gb: Memory = None,
+    allow_mixed: AllowMixed = False,
     quiet: Quiet = False,
 ) -> None:
     """Repeat a study on a grid of parameters, the same plants and noise in every cell."""
@@ -94,8 +108,8 @@ def sweep(
     axes += [split_axis(text) for text in axis or ()]
     given = given_settings(
         motions, motion_list, trials=trials, seed=seed, controllers=controllers, records=records,
-        scale=scale, pga=pga, sa=sa, units=units, resample=resample, out=out, devices=devices,
-        memory_gb=memory_gb,
+        scale=scale, pga=pga, sa=sa, units=units, dt=dt, variable=variable, resample=resample,
+        out=out, devices=devices, memory_gb=memory_gb,
     )  # fmt: skip
     settings = {} if config is None else read_toml(config)
     chosen = make_sweep(
@@ -108,7 +122,7 @@ def sweep(
     try:
         done = run_sweep(
             chosen, reporter=reporter_for(quiet), fresh=fresh, figures=figures,
-            command_line=command_line(),
+            allow_mixed=allow_mixed, command_line=command_line(),
         )  # fmt: skip
     except KeyboardInterrupt:
         say_what_is_kept(chosen.study.out)

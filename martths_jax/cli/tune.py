@@ -9,7 +9,7 @@ import typer
 
 from martths_jax.benchmark import VOLT_LIMIT, build_benchmark
 from martths_jax.cli.console import console, error_console
-from martths_jax.cli.motion_options import Records, Scale, load_all
+from martths_jax.cli.motion_options import Dt, Records, Scale, Units, Variable, load_all
 from martths_jax.errors import InputError
 from martths_jax.screen import ScreenTable
 from martths_jax.text import counted
@@ -32,6 +32,9 @@ def tune(
     ] = "kobe-like",
     records: Records = None,
     scale: Scale = None,
+    units: Units = None,
+    dt: Dt = None,
+    variable: Variable = None,
     plants: Annotated[int, typer.Option("--plants", help="Uncertain plants to tune on.")] = 32,
     fresh: Annotated[int, typer.Option("--fresh-plants", help="Plants of the comparison.")] = 128,
     seed: Annotated[int, typer.Option("--seed", help="Seed of plants and noise.")] = 1,
@@ -65,9 +68,11 @@ def tune(
         )
     if fresh < 1:
         raise InputError(f"Option --fresh-plants must be at least 1, but got {fresh}.")
-    *tuned_on, unseen = load_all([*motions, check], records, scale)
+    *tuned_on, unseen = load_all(
+        [*motions, check], records, scale, units=units, dt=dt, variable=variable
+    )
     benchmark = build_benchmark()
-    state = run_tuning(benchmark, options, tuned_on, out, tell=_tell)
+    state = run_tuning(benchmark, options, tuned_on, out, tell=_tell, notice=_notice)
     rows = write_report(benchmark, controller, state, unseen, fresh, out)
     console.print(_table(rows, controller, unseen.name, fresh))
     console.print(f"{state['ended'] or 'All steps done'}; results in {out}", soft_wrap=True)
@@ -89,6 +94,10 @@ def _tell(row: dict) -> None:
     shown = [f"{n} {v:.3f}" for n, v in row.items() if n not in skip and not n.startswith("log10_")]
     line = f"step {row['step']}: objective {row['objective']:.4f}; {', '.join(shown)}"
     error_console.print(line if row["accepted"] else f"{line} (unstable: backed off)")
+
+
+def _notice(text: str) -> None:
+    error_console.print(text, highlight=False, markup=False, soft_wrap=True)
 
 
 def _table(rows: list[dict], controller: str, motion: str, plants: int) -> ScreenTable:

@@ -9,6 +9,7 @@ same model applied to the target strokes.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
 import jax
@@ -68,9 +69,9 @@ class ADFC(Controller):
         solver: ``ldl`` (unrolled, fast) or ``lu`` (``jnp.linalg.solve``, the reference).
         estimator: the Kalman filter, designed by ``prepare``.
 
-    Scalars may be given as arrays over trials (T,).  A fit whose normal matrix is singular or
-    worse conditioned than 1e14 leaves the last good coefficients in place; ``Result.watch.held``
-    counts these.
+    Scalars may be given as arrays over trials (T,), `start` and `anchor` as (8, 2, T).  A fit whose
+    normal matrix is singular or worse conditioned than 1e14 leaves the last good coefficients in
+    place; ``Result.watch.held`` counts these.
     """
 
     nb: int = field(default=1024, metadata={"static": True})
@@ -84,6 +85,7 @@ class ADFC(Controller):
     estimator: Any = None
 
     name = "adfc"
+    shared_axes = MappingProxyType({"no": 0, "pull": 0, "q": 0, "start": 2, "anchor": 2})
 
     def __post_init__(self):
         numbers = (self.no, 0 if self.pull is None else self.pull, self.q)

@@ -10,7 +10,9 @@ To add one, write one file: subclass ``Controller``, give it ``init`` and ``step
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import jax
@@ -69,11 +71,15 @@ class Controller(ABC):
         name: short name for tables and files.
         first_lag_range: 0 if delays of a few ms are to be expected, 1 for tens of ms; only saves
             time, since a run whose delay lies outside is repeated with a wider range.
+        shared_axes: number of axes of array fields when all trials share them; with one more, the
+            last, a field holds one value a trial.  A field that is not named here may too, where
+            the controller works with one value a trial and not otherwise.
     """
 
     window: int = 0
     name: str = "controller"
     first_lag_range: int = 0
+    shared_axes: Mapping[str, int] = MappingProxyType({})
 
     def prepare(self, benchmark: Benchmark) -> Controller:
         """Finish the design for a benchmark (on the host, before the loop).

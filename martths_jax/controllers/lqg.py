@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
 import jax
@@ -10,9 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from scipy import linalg
 
+from martths_jax.benchmark import Benchmark
 from martths_jax.controllers.base import Controller, Decision
+from martths_jax.design.closed_loop import lowest_stable_rate, nominal_radius
 from martths_jax.errors import argument_error
 from martths_jax.kalman import design_kalman
+from martths_jax.runtime import check_runtime
 from martths_jax.structure.modal import contract
 
 
@@ -34,6 +38,7 @@ class LQG(Controller):
     weights: tuple = field(default=(), metadata={"static": True})
 
     name = "lqg"
+    shared_axes = MappingProxyType({"K_z": 3, "K_e": 2})
 
     @classmethod
     def design(
@@ -44,6 +49,7 @@ class LQG(Controller):
         r: tuple[float, float] = (1.0, 10**-0.907),
         y: tuple[float, float] = (10**0.699, 10**1.580),
         q: float = 3e-5,
+        allow_unstable: bool = False,
     ) -> LQG:
         """Gains from the continuous-time Riccati equation of the plant with integral action.
 
@@ -56,38 +62,45 @@ class LQG(Controller):
             r: weights of the two commands [-].
             y: weights of the two strokes [-].
             q: process noise of the Kalman filter [mm^2].
+            allow_unstable: return a design whose loop runs away on the benchmark's own plant, too.
 
         The published weights are not known.  The defaults are the least-squares fit of these
         weights to Table 4's LQG column, with the filter of ADFC's default and valve commands of at
         most 3.3 V on the nominal plant (experiments/calibrate_lqg).
 
         Raises:
-            InputError: if a weight is not positive (y may be zero) or no solution exists.
+            InputError: if a weight is not positive (y may be zero) or traced, no solution exists,
+                or the loop is unstable on the benchmark's own plant at its sampling rate.
         """
-        for name, pair, low in (("e", e, 0.0), ("r", r, 0.0), ("y", y, -1e-300)):
-            pair = np.asarray(pair, dtype=float)
-            if pair.shape != (2,) or not np.all(np.isfinite(pair) & (pair > low)):
-                wanted = "be two positive numbers" if low == 0 else "be two non-negative numbers"
-                raise argument_error(name, wanted, pair.tolist())
+        check_runtime()
+        if not isinstance(benchmark, Benchmark):
+            got = type(benchmark).__name__
+            raise argument_error("benchmark", "be a Benchmark", got, "Use build_benchmark().")
+        check_weights(e, r, y, q)
         A, B, C = benchmark.plant_continuous
         n = A.shape[0]
         A_aug = np.block([[A, np.zeros((n, 2))], [-C, np.zeros((2, 2))]])
         B_aug = np.vstack([B, np.zeros((2, 2))])
         Q = linalg.block_diag(C.T @ np.diag(y) @ C, np.diag(e))
         try:
-            X = linalg.solve_continuous_are(A_aug, B_aug, Q, np.diag(r))
+            with np.errstate(all="ignore"):
+                X = linalg.solve_continuous_are(A_aug, B_aug, Q, np.diag(r))
         except (np.linalg.LinAlgError, ValueError) as error:
             raise argument_error(
                 "e, r, y", "give a solvable Riccati equation", f"e={e}, r={r}, y={y} ({error})"
             ) from None
         K = np.linalg.solve(np.diag(r), B_aug.T @ X)
         K_z = np.swapaxes(K[:, :n].reshape(2, n // 2, 2), 1, 2)
-        return cls(
-            K_z=jnp.asarray(K_z),
-            K_e=jnp.asarray(K[:, n:]),
-            estimator=design_kalman(benchmark.plant_model, q, benchmark.r_mm2),
-            weights=(("e", tuple(e)), ("r", tuple(r)), ("y", tuple(y)), ("q", float(q))),
-        )
+        with jax.ensure_compile_time_eval():  # the numbers are known, under jit too
+            made = cls(
+                K_z=jnp.asarray(K_z),
+                K_e=jnp.asarray(K[:, n:]),
+                estimator=design_kalman(benchmark.plant_model, q, benchmark.r_mm2),
+                weights=(("e", tuple(e)), ("r", tuple(r)), ("y", tuple(y)), ("q", float(q))),
+            )
+        if not allow_unstable:
+            refuse_unstable(benchmark, made, q)
+        return made
 
     def prepare(self, benchmark):
         # Designs that differ in numbers only share a program, and can be mixed trial by trial.
@@ -100,3 +113,51 @@ class LQG(Controller):
         error = state + seen.dt * (seen.target_mm - seen.measured_mm)
         command = -contract(self.K_z, seen.state, axes=2) - contract(self.K_e, error)
         return error, Decision(command_mm=command, signals={"error_integral": error})
+
+
+def check_weights(e, r, y, q) -> None:
+    """Refuse weights of ``LQG.design`` that are no numbers or out of range.
+
+    Raises:
+        InputError: naming the first such weight.
+    """
+    for name, given, shape, low in (
+        ("e", e, (2,), 0.0), ("r", r, (2,), 0.0), ("y", y, (2,), -1e-300), ("q", q, (), 0.0),
+    ):  # fmt: skip
+        count = "two" if shape else "a"
+        wanted = f"be {count} {'positive' if low == 0 else 'non-negative'} number{'s' * len(shape)}"
+        if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(given)):
+            raise argument_error(
+                name, wanted, "a traced value",
+                "martths_jax.design.lqg.lqg_from_weights can be traced and differentiated.",
+            )  # fmt: skip
+        try:
+            values = np.asarray(given, dtype=float)
+        except (TypeError, ValueError):
+            values = np.array(np.nan)
+        if values.shape != shape or not np.all(np.isfinite(values) & (values > low)):
+            raise argument_error(name, wanted, repr(given)[:80])
+
+
+def refuse_unstable(benchmark, made: LQG, q: float) -> None:
+    """Refuse a design whose loop runs away on the plant it was made for.
+
+    Raises:
+        InputError: with the lowest sampling rate that holds, where that is the cause.
+    """
+    step = jax.tree.map(np.asarray, replace(made, estimator=None)).step
+    radius = nominal_radius(benchmark, made.estimator.filter_gain, step)
+    if radius < 1:
+        return
+    lowest = lowest_stable_rate(benchmark, q, step)
+    remedy = "Raise r or lower e"
+    if lowest is not None:
+        remedy = (
+            f"With these weights the lowest sampling rate that holds is {lowest:g} Hz; raise fs"
+        )
+    raise argument_error(
+        "e, r, y, q",
+        "give a loop that is stable on the nominal plant",
+        f"one with a pole of magnitude {radius:.6g} at {benchmark.fs:g} Hz",
+        f"{remedy}, or design with allow_unstable=True to see it run away.",
+    )

@@ -15,6 +15,7 @@ from martths_jax.benchmark import Benchmark
 from martths_jax.controllers.lqg import LQG
 from martths_jax.design.riccati import care, dense_kalman_gain, solve
 from martths_jax.kalman import KalmanFilter
+from martths_jax.runtime import check_precision
 from martths_jax.structure.modal import to_dense
 
 #: Free weights of the design; that of the first command is 1, since only ratios matter.
@@ -32,6 +33,7 @@ def lqg_from_weights(benchmark: Benchmark, log_weights: Mapping[str, jax.Array])
     Returns:
         The controller of ``LQG.design`` for e = (e1, e2), r = (1, r2), y = (y1, y2), q.
     """
+    check_precision()
     w = {name: 10.0 ** jnp.asarray(log_weights[name], dtype=float) for name in WEIGHTS}
     C = benchmark.plant_continuous[2]
     n = C.shape[1]
@@ -58,6 +60,7 @@ def tracking_gains(
     Returns:
         K_z (2, 2, 4), K_e (2, 2) as ``LQG`` holds them.
     """
+    check_precision()
     A, B, C = benchmark.plant_continuous
     n = A.shape[0]
     A = jnp.block([[A, jnp.zeros((n, 2))], [-C, jnp.zeros((2, 2))]])
@@ -77,5 +80,6 @@ def kalman_gain(benchmark: Benchmark, q: jax.Array, r: jax.Array | None = None) 
         q: variance of the process noise through the plant's inputs [mm^2], a scalar or (2, 2).
         r: variance of the measurement noise [mm^2], a scalar or (2, 2); the benchmark's by default.
     """
+    check_precision()
     A, B, C, _ = to_dense(benchmark.plant_model)
     return dense_kalman_gain(A, B, C, q, benchmark.r_mm2 if r is None else r)

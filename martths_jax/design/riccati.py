@@ -21,6 +21,8 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
+from martths_jax.runtime import check_precision
+
 DOUBLINGS = 60  # 2^60 steps of the fixed-point iteration: never reached by a solvable equation
 NEWTON_STEPS = 3
 BALANCING_SWEEPS = 12
@@ -36,6 +38,7 @@ def care(A: jax.Array, B: jax.Array, Q: jax.Array, R: jax.Array) -> jax.Array:
     Returns:
         X (n, n), symmetric; not finite or not stabilising if there is no such solution.
     """
+    check_precision()
     return _care(A, _symmetric(B @ solve(R, B.T)), _symmetric(Q))
 
 
@@ -44,6 +47,7 @@ def dare(A: jax.Array, B: jax.Array, Q: jax.Array, R: jax.Array) -> jax.Array:
 
     Args and result as in ``care``.
     """
+    check_precision()
     return _dare(A, _symmetric(B @ solve(R, B.T)), _symmetric(Q))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from martths_jax.figures.source import Source
@@ -18,26 +20,29 @@ from martths_jax.text import counted
 
 FREQUENCY = np.geomspace(0.1, 100.0, 160)  # Hz
 BANDS = ((5, 95, "0.86"), (25, 75, "0.70"))
+PERCENTS = [percent for low, high, _ in BANDS for percent in (low, high)]
+#: Responses worked on at once: memory does not grow with plants times frequencies.
+BLOCK = 2_000_000
 
 
 def bode(source: Source) -> Drawing:
     """Magnitude and phase of the four channels: percentile bands of the plants over the nominal."""
     plants = np.asarray(source.study.dataset.plant_hz.values)[1:]
-    drawn = _response(plants)  # (F, 2, 2, T)
-    nominal = _response(NOMINAL_HZ[None])[..., 0]
+    drawn = _magnitude_and_phase(plants, _percentiles)
+    nominal = _magnitude_and_phase(NOMINAL_HZ[None], _only)
     figure = new_figure(DOUBLE, 118)
     axes = figure.subplots(4, 4, sharex=True)
     data = {"frequency_hz": FREQUENCY}
-    rows = (("magnitude_db", _magnitude, "dB"), ("phase_deg", _phase, "°"))
+    rows = (("magnitude_db", "dB"), ("phase_deg", "°"))
     for column, (i, j) in enumerate(np.ndindex(2, 2)):
         axes[0, column].set_title(f"$H_{{{i + 1}{j + 1}}}$")
         axes[-1, column].set_xlabel("frequency [Hz]")
-        for k, (what, measure, unit) in enumerate(rows):
-            values, middle = measure(drawn[:, i, j]), measure(nominal[:, i, j])
+        for k, (what, unit) in enumerate(rows):
+            bands, middle = drawn[k][..., i, j], nominal[k][:, i, j]
             name = f"H{i + 1}{j + 1}_{what}"
             absolute, relative = axes[2 * k : 2 * k + 2, column]
-            _bands(absolute, values, data, name)
-            _bands(relative, values - middle[:, None], data, f"{name}_from_nominal")
+            _bands(absolute, bands, data, name)
+            _bands(relative, bands - middle, data, f"{name}_from_nominal")
             for axis, curve in ((absolute, middle), (relative, 0 * middle)):
                 axis.plot(FREQUENCY, curve, color="black", lw=0.9, label="nominal")
                 axis.set(xscale="log", xlim=(FREQUENCY[0], FREQUENCY[-1]))
@@ -56,23 +61,62 @@ def bode(source: Source) -> Drawing:
     return Drawing(figure, data, caption)
 
 
-def _response(plants_hz: np.ndarray) -> np.ndarray:
-    return np.asarray(frequency_response(plants_hz, FREQUENCY))
+def _responses(plants_hz: np.ndarray, of: Callable = lambda response: response):
+    """Responses of plants in blocks of frequencies, so that any number of plants fits in memory.
+
+    Args:
+        plants_hz: (T, 9) as in ``Plants.parameters_hz``.
+        of: what is wanted of the responses (B, 2, 2, T), such as a sum over the commands.
+
+    Yields:
+        frequencies (B,) [Hz], what `of` gives, and its phase [rad], continuous over all blocks.
+    """
+    size = max(1, BLOCK // (4 * len(plants_hz)))
+    before = None
+    for first in range(0, FREQUENCY.size, size):
+        frequency = FREQUENCY[first : first + size]
+        response = of(np.asarray(frequency_response(plants_hz, frequency)))
+        angle = np.angle(response)
+        joined = angle if before is None else np.concatenate([before, angle])
+        phase = np.unwrap(joined, axis=0)[-frequency.size :]
+        before = phase[-1:]
+        yield frequency, response, phase
 
 
-def _magnitude(response: np.ndarray) -> np.ndarray:
-    return 20 * np.log10(np.abs(response))
+def _percentiles(values: np.ndarray) -> np.ndarray:
+    """(B, ..., T) as (percents, B, ...)."""
+    return np.percentile(values, PERCENTS, axis=-1)
 
 
-def _phase(response: np.ndarray) -> np.ndarray:
-    return np.rad2deg(np.unwrap(np.angle(response), axis=0))
+def _only(values: np.ndarray) -> np.ndarray:
+    """(B, ..., 1) as (B, ...)."""
+    return values[..., 0]
 
 
-def _bands(axis, values: np.ndarray, data: dict, name: str) -> None:
+def _magnitude_and_phase(plants_hz: np.ndarray, reduce: Callable) -> list[np.ndarray]:
+    """Magnitude [dB] and phase [degree] of the four channels, (..., F, 2, 2), plants reduced."""
+    blocks = [
+        (reduce(20 * np.log10(np.abs(response))), reduce(np.rad2deg(phase)))
+        for _, response, phase in _responses(plants_hz)
+    ]
+    return [np.concatenate(parts, axis=-3) for parts in zip(*blocks, strict=True)]
+
+
+def _bands(axis, percentiles: np.ndarray, data: dict, name: str) -> None:
+    found = dict(zip(PERCENTS, percentiles, strict=True))
     for low, high, shade in BANDS:
-        a, b = np.percentile(values, [low, high], axis=-1)
+        a, b = found[low], found[high]
         axis.fill_between(FREQUENCY, a, b, color=shade, lw=0, label=f"P{low}–P{high}")
         data[f"{name}_P{low}"], data[f"{name}_P{high}"] = a, b
+
+
+def _plant_delay(plants_hz: np.ndarray, fs: float, reduce: Callable) -> np.ndarray:
+    """Delay [ms] with both actuators commanded alike, (..., F, 2), plants reduced."""
+    blocks = [
+        reduce(1e3 * (0.5 / fs - phase / (2 * np.pi * frequency[:, None, None])))
+        for frequency, _, phase in _responses(plants_hz, lambda response: response.sum(axis=2))
+    ]
+    return np.concatenate(blocks, axis=-2)
 
 
 def delay(source: Source) -> Drawing:
@@ -83,30 +127,22 @@ def delay(source: Source) -> Drawing:
     phase of the cross spectrum of target and measured stroke (Welch, 4 s windows), where the target
     has at least a ten-thousandth of its largest power density.
     """
-    omega = 2 * np.pi * FREQUENCY[:, None]
-    half_sample = 0.5 / source.fs
-
-    def plant_delay(plants):
-        response = np.unwrap(np.angle(_response(plants).sum(axis=2)), axis=0)  # (F, 2, T)
-        return 1e3 * (half_sample - response / omega[..., None])
-
-    drawn, nominal = (
-        plant_delay(source.study.dataset.plant_hz.values[1:]),
-        plant_delay(NOMINAL_HZ[None]),
-    )
+    plants = np.asarray(source.study.dataset.plant_hz.values)[1:]
+    drawn = _plant_delay(plants, source.fs, _percentiles)
+    nominal = _plant_delay(NOMINAL_HZ[None], source.fs, _only)
     figure = new_figure(DOUBLE, 72)
     axes = figure.subplots(1, 2, sharey=True)
     data: dict[str, np.ndarray] = {}
     for i, axis in enumerate(axes):
-        _bands(axis, drawn[:, i], data, f"plant_{i + 1}_ms")
+        _bands(axis, drawn[..., i], data, f"plant_{i + 1}_ms")
         axis.plot(
             FREQUENCY,
-            nominal[:, i, 0],
+            nominal[:, i],
             color="black",
             lw=1.0,
             label="nominal plant, no compensation",
         )
-        data[f"plant_{i + 1}_ms_nominal"] = nominal[:, i, 0]
+        data[f"plant_{i + 1}_ms_nominal"] = nominal[:, i]
         for name in source.controllers:
             run = source.history(name, source.motion)
             f, late = spectral_delay(run["x_a"][:, i], run["x_m"][:, i], source.fs)
@@ -117,7 +153,7 @@ def delay(source: Source) -> Drawing:
         axis.axhline(0, color="0.4", lw=0.6)
         axis.set_xscale("log")
         axis.set(xlim=(0.2, 30), xlabel="frequency [Hz]", title=f"actuator {i + 1}")
-    high = np.max(np.percentile(drawn, 95, axis=-1)[FREQUENCY >= 0.2])
+    high = np.max(drawn[PERCENTS.index(95), FREQUENCY >= 0.2])
     axes[0].set(ylabel="delay [ms]", ylim=(-0.25 * high, 1.1 * high))
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))

@@ -21,6 +21,8 @@ from martths_jax.indices import DELAYS, NAMES
 
 ERRORS = tuple(n for n in NAMES if n not in DELAYS)
 PERCENTS = (5, 25, 50, 75, 95)
+#: Steps of a distribution function that are drawn, at most.
+STEPS = 2000
 
 
 def controllers(source: Source) -> Drawing:
@@ -132,14 +134,21 @@ def _edges(sample: np.ndarray, bins: int = 30) -> np.ndarray:
 
 
 def ecdf(source: Source) -> Drawing:
-    """Empirical distribution functions of all indices of one motion."""
+    """Empirical distribution functions of all indices of one motion.
+
+    Of curves of more than ``STEPS`` steps, so many are drawn, evenly by rank and with both ends:
+    each is a point of the whole curve.
+    """
     columns: dict[str, list] = {k: [] for k in ("index", "controller", "value", "share")}
+    trials = int(source.study.dataset.sizes["trial"]) - 1
 
     def panel(axis, name: str) -> None:
         for c in source.controllers:
             sample = np.sort(source.values(c, source.motion, name))
             sample = sample[np.isfinite(sample)]
             share = np.arange(1, sample.size + 1) / max(sample.size, 1)
+            drawn = _spaced(sample.size, STEPS)
+            sample, share = sample[drawn], share[drawn]
             axis.step(sample, share, where="post", **line(source.position(c)),
                       label=controller_label(c))  # fmt: skip
             for column, values in zip(
@@ -153,7 +162,18 @@ def ecdf(source: Source) -> Drawing:
         "Empirical distribution functions of the 24 indices over the uncertain plants that "
         f"finished, {motion_label(source.motion)}."
     )
+    if trials > STEPS:
+        note = f"{STEPS} of {trials} trials drawn, evenly by rank"
+        figure.supxlabel(f"of each curve {note}", fontsize=6)
+        caption += f" Of each curve {note}; the shares are those of all."
     return Drawing(figure, columns, caption)
+
+
+def _spaced(size: int, most: int) -> np.ndarray:
+    """At most `most` of the positions 0 ... size - 1, evenly spaced, with both ends."""
+    if size <= most:
+        return np.arange(size)
+    return np.linspace(0, size - 1, most).round().astype(int)
 
 
 def _panels(names, panel, height: float, ylabel: str):

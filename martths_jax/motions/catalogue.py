@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import re
 from pathlib import Path
 
 from ..errors import InputError
 from .builtin import BUILTIN_NAMES
 from .readers import READERS
+from .readers.columns import plain
 
 #: Environment variable that stands in for ``--records``.
 RECORDS_VARIABLE = "MARTHS_RECORDS"
@@ -19,11 +19,6 @@ BENCHMARK_NAMES = {
     "kobeaccelnoscaling": "kobe",
     "morganaccelnoscaling": "morganhill",
 }
-
-
-def plain(name: str) -> str:
-    """A name without case and punctuation, for comparing."""
-    return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
 def short_name(path: Path) -> str:

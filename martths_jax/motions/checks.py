@@ -1,4 +1,4 @@
-"""Checks that every reader shares: time axis, finite numbers, memory."""
+"""Checks that every reader shares: finite numbers, memory, and what the file says of itself."""
 
 from __future__ import annotations
 
@@ -9,18 +9,14 @@ import numpy as np
 from ..errors import InputError
 from ..resources import available_memory
 
-#: Largest departure of a time stamp from the uniform grid, as a fraction of the step: wide enough
-#: for times printed with few digits, far below one missing or doubled sample.
-TIME_TOLERANCE = 0.02
-
 #: Part of the memory now free that one motion may take, with the work arrays around it.
 MEMORY_SHARE = 0.5
 _WORK_COPIES = 6
 
 
-def check_memory(samples: float, where: str) -> None:
+def check_memory(samples: float, where: str, copies: float = _WORK_COPIES) -> None:
     """Refuse `samples` float64 values (and the copies made of them) that would not fit."""
-    need = 8.0 * float(samples) * _WORK_COPIES
+    need = 8.0 * float(samples) * copies
     limit = MEMORY_SHARE * available_memory()
     if not need <= limit:
         raise InputError(
@@ -56,31 +52,26 @@ def finite_values(values: np.ndarray, where: str, lines: list[int] | None = None
     return values
 
 
-def uniform_step(time: np.ndarray, where: str, lines: list[int] | None = None) -> float:
-    """Time step [s] of a uniform, increasing time axis (n,) [s]."""
-    time = np.asarray(time, dtype=np.float64).ravel()
-    bad = np.flatnonzero(~np.isfinite(time))
-    with np.errstate(all="ignore"):
-        steps = np.diff(time)
-        dt = (time[-1] - time[0]) / (time.size - 1)
-        if not bad.size:
-            bad = np.flatnonzero(~(steps > 0)) + 1
-        if not bad.size and np.isfinite(dt):
-            grid = time[0] + dt * np.arange(time.size)
-            if np.max(np.abs(time - grid)) > TIME_TOLERANCE * dt:
-                typical = np.median(steps)
-                bad = np.flatnonzero(np.abs(steps - typical) > TIME_TOLERANCE * typical) + 1
-                bad = bad if bad.size else np.array([time.size - 1])
-    if bad.size or not (np.isfinite(dt) and dt > 0):
-        first = int(bad[0]) if bad.size else 0
-        place = f"line {lines[first]}" if lines else f"sample {first + 1}"
-        before = f" after {time[first - 1]:.10g} s" if first else ""
+def check_stated_peak(
+    values: np.ndarray, stated: float, where: str, tolerance: float = 0.02
+) -> None:
+    """Refuse samples whose largest magnitude is not what the file's header says, in its unit."""
+    peak = float(np.max(np.abs(values))) if np.size(values) else 0.0
+    if abs(peak - abs(stated)) > tolerance * abs(stated) + 0.002:
         raise InputError(
-            f"{where}, {place}: found the time {time[first]:.10g} s{before}, but the time step "
-            "must be the same, and positive, throughout; interpolate the record to a uniform "
-            "step first."
+            f"{where}: the header says that the peak is {abs(stated):.6g}, but the samples reach "
+            f"{peak:.6g}; the file is damaged, or not in the unit it says: download it again."
         )
-    return float(dt)
+
+
+def check_stated_count(found: int, stated: int, where: str, name: str = "NPTS") -> None:
+    """Refuse another number of samples than the file's header says."""
+    if found != stated:
+        fewer = found < stated
+        remedy = "it is truncated: download it again" if fewer else f"correct {name} or the data"
+        raise InputError(
+            f"{where}: the header says {name} = {stated}, but {found} values follow; {remedy}."
+        )
 
 
 def file_bytes(path: Path) -> bytes:

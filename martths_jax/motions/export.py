@@ -33,12 +33,16 @@ def write_csv(record: Record, path: Path) -> None:
 
 
 def target_facts(
-    like: str, records: str | os.PathLike | None = None, units: str | None = None
+    like: str,
+    records: str | os.PathLike | None = None,
+    units: str | None = None,
+    dt: float | None = None,
+    variable: str | int | None = None,
 ) -> Facts:
     """Facts of a stored record (``elcentro`` or ``elcentro-like``), else of a motion's file."""
     if like in BUILTIN_NAMES or like in stored_facts():
         return builtin_facts(like)
-    return measure(load_record(like, records=records, units=units))
+    return measure(load_record(like, records=records, units=units, dt=dt, variable=variable))
 
 
 def write_ensemble(
@@ -49,6 +53,8 @@ def write_ensemble(
     seed: int = 0,
     records: str | os.PathLike | None = None,
     units: str | None = None,
+    dt: float | None = None,
+    variable: str | int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[dict]:
     """Make `count` motions compatible with one target and write them, and how well they fit.
@@ -58,7 +64,7 @@ def write_ensemble(
         count: number of motions.
         folder: where ``NAME-001.csv``, ... and ``ensemble.json`` go; made if missing.
         seed: seed of the ensemble; member i depends on (seed, i) alone.
-        records, units: as for `load_motion`.
+        records, units, dt, variable: as for `load_motion`.
         progress: called as progress(done, count).
 
     Returns:
@@ -69,7 +75,7 @@ def write_ensemble(
             holds an ensemble.
     """
     folder = Path(folder)
-    facts = target_facts(like, records, units)
+    facts = target_facts(like, records, units, dt, variable)
     name = Path(like).stem.removesuffix("-like")
     if (folder / SUMMARY).exists():
         raise InputError(f"Folder {folder} already holds an ensemble ({SUMMARY}); give another.")

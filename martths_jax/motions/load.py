@@ -14,7 +14,7 @@ from .catalogue import find_file, short_name
 from .checks import check_memory
 from .measures import spectral_acceleration
 from .motion import Motion
-from .readers import read_record
+from .readers import read_record, record_of_array
 from .record import Record
 from .resampling import resample as resample_to
 from .units import parse_acceleration, parse_spectral_target
@@ -27,14 +27,23 @@ QUIET_TAIL = 5.0
 
 
 def load_record(
-    path_or_name: str | os.PathLike,
+    path_or_name: str | os.PathLike | np.ndarray,
     *,
     records: str | os.PathLike | None = None,
     units: str | None = None,
     dt: float | None = None,
-    variable: str | None = None,
+    variable: str | int | None = None,
 ) -> Record:
-    """The unscaled record behind a name or path, at its own time step (see `load_motion`)."""
+    """The unscaled record behind a name, path or array, at its own step (see `load_motion`)."""
+    if isinstance(path_or_name, (np.ndarray, list, tuple)):
+        return record_of_array(path_or_name, units=units, dt=dt, variable=variable)
+    if not isinstance(path_or_name, (str, os.PathLike)):
+        raise argument_error(
+            "path_or_name",
+            "be the name of a motion, the path of its file, or an array",
+            repr(path_or_name)[:60],
+            f"Built-in names are {', '.join(BUILTIN_NAMES)}.",
+        )
     if os.fspath(path_or_name) in BUILTIN_NAMES:
         return builtin_record(os.fspath(path_or_name))
     path = find_file(os.fspath(path_or_name), records)
@@ -42,7 +51,7 @@ def load_record(
 
 
 def load_motion(
-    path_or_name: str | os.PathLike,
+    path_or_name: str | os.PathLike | np.ndarray,
     *,
     scale: float = DEFAULT_SCALE,
     fs: float = 1024,
@@ -53,13 +62,13 @@ def load_motion(
     resample: str = "linear",
     tail: float = QUIET_TAIL,
     dt: float | None = None,
-    variable: str | None = None,
+    variable: str | int | None = None,
 ) -> Motion:
     """A ground motion, scaled and sampled for a simulation.
 
     Args:
         path_or_name: name of a built-in motion (``elcentro-like``), path of a file, or name of one
-            in the folder of records.
+            in the folder of records; or an array, a vector or 2 x N or N x 2 (time, acceleration).
         scale: factor on the unscaled record; the benchmark's is 0.40.
         fs: sampling rate [Hz]; N = floor(duration fs) + 1 samples at k/fs.
         records: folder of records (default: ``$MARTHS_RECORDS``).
@@ -71,7 +80,8 @@ def load_motion(
         tail: quiet time at the end [s]; a record that has less of it gets zeros appended, and a
             notice.  The structure comes to rest in it, as with the benchmark's records.
         dt: time step [s] of a file without time.
-        variable: array of a MATLAB file that holds several.
+        variable: column of a table or channel of a file that holds several, by its name or its
+            number from 1; array of a MATLAB file (``struct.field``; ``array:3`` for a column).
 
     Raises:
         InputError: for anything that cannot be found, read, scaled or held in memory.

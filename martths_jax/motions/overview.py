@@ -26,6 +26,7 @@ class MotionInfo:
         measures: of `intensity_measures`: PGA [m/s^2], PGV [m/s], Arias [m/s], CAV [m/s],
             D5-95 [s], Sa at `FIRST_MODE`, 5 % damping [m/s^2].
         problem: why a file cannot be read, or an empty text.
+        notices: sentences a user should read.
     """
 
     name: str
@@ -34,19 +35,34 @@ class MotionInfo:
     duration: float | None = None
     measures: dict[str, float] = field(default_factory=dict)
     problem: str = ""
+    notices: tuple[str, ...] = ()
 
 
 def motion_info(
-    name: str, records: str | os.PathLike | None = None, units: str | None = None
+    name: str,
+    records: str | os.PathLike | None = None,
+    units: str | None = None,
+    dt: float | None = None,
+    variable: str | int | None = None,
 ) -> MotionInfo:
     """`MotionInfo` of one motion; `InputError` where it cannot be read."""
-    record = load_record(name, records=records, units=units)
+    record = load_record(name, records=records, units=units, dt=dt, variable=variable)
     measures = intensity_measures(record.acceleration, record.dt, FIRST_MODE)
-    return MotionInfo(record.name, record.source, record.dt, record.duration, measures)
+    return MotionInfo(
+        record.name,
+        record.source,
+        record.dt,
+        record.duration,
+        measures,
+        notices=record.notices,
+    )
 
 
 def available_motions(
-    records: str | os.PathLike | None = None, units: str | None = None
+    records: str | os.PathLike | None = None,
+    units: str | None = None,
+    dt: float | None = None,
+    variable: str | int | None = None,
 ) -> list[MotionInfo]:
     """Built-in motions, then the files of the folder of records (or ``$MARTHS_RECORDS``).
 
@@ -55,7 +71,7 @@ def available_motions(
     found = [motion_info(name) for name in BUILTIN_NAMES]
     for name, path in record_files(records).items():
         try:
-            info = motion_info(os.fspath(path), units=units)
+            info = motion_info(os.fspath(path), units=units, dt=dt, variable=variable)
         except InputError as error:
             info = MotionInfo(name, os.fspath(path), problem=str(error))
         found.append(info)

@@ -1,8 +1,9 @@
 "use strict";
 // The page's behaviour: the table of all trials, and the time histories of the kept ones.
-(function () {
-  const data = JSON.parse(document.getElementById("data").textContent);
+(async function () {
   const byId = (id) => document.getElementById(id);
+  const data = JSON.parse(byId("data").textContent);
+  const stored = JSON.parse(byId("stored").textContent);
   const element = (tag, text) => {
     const e = document.createElement(tag);
     if (text !== undefined) e.textContent = text;
@@ -15,13 +16,13 @@
     { name: "controller", get: (r) => r.cell.controller, text: true },
     { name: "motion", get: (r) => r.cell.motion, text: true },
     { name: "trial", get: (r) => r.trial },
-    { name: "status", get: (r) => data.status[r.cell.status[r.trial]], text: true },
+    { name: "status", get: (r) => data.status[r.cell.status[r.place]], text: true },
     ...data.indices.map((index, i) => ({
-      name: index.name, unit: index.unit, get: (r) => r.cell.values[i][r.trial],
+      name: index.name, unit: index.unit, get: (r) => r.cell.values[i][r.place],
     })),
   ];
   const rows = data.cells.flatMap((cell) =>
-    Array.from({ length: data.trials }, (_, trial) => ({ cell, trial })));
+    data.trials.map((trial, place) => ({ cell, trial, place })));
   const filters = columns.map(() => "");
   const state = { sort: null, down: false, page: 0, found: rows };
 
@@ -128,7 +129,7 @@
   const plot = byId("plot");
   let current, lines = [];
 
-  const find = (controller, motion, trial) => data.histories.find((h) =>
+  const find = (controller, motion, trial) => stored.find((h) =>
     h.controller === controller && h.motion === motion && h.trial === trial);
 
   function decode(signal, dt) {
@@ -208,15 +209,11 @@
     });
     byId("plot-note").textContent =
       `${current.controller} on ${current.motion}, trial ${current.trial} (${current.role}). ` +
-      `Drag to zoom all panels, double-click for the whole record. Strokes, errors and forces: ` +
-      `${every(current.signals[0].stride)} sample is in this file.`;
+      "Drag to zoom all panels, double-click for the whole record. Strokes, errors and forces: " +
+      `${part(current.signals[0].stride)} in this file.`;
   }
 
-  // "every sample", "every 2nd sample", "every 11th sample"
-  const every = (n) => {
-    const ending = Math.floor(n / 10) % 10 === 1 ? "th" : ["th", "st", "nd", "rd"][n % 10] ?? "th";
-    return n === 1 ? "every" : `every ${n}${ending}`;
-  };
+  const part = (stride) => (stride === 1 ? "every sample is" : `one sample in ${stride} is`);
 
   // New detail for the window in view.
   function refine() {
@@ -228,6 +225,7 @@
   const zoomOut = () => Plotly.relayout(plot, { "xaxis.range": [0, (current.samples - 1) * current.dt] });
 
   function show(run) {
+    if (plot.hidden) return;
     current = run;
     lines = linesOf(run);
     draw();
@@ -246,8 +244,8 @@
 
   function choices() {
     const unique = (key, runs) => [...new Set(runs.map((h) => h[key]))].map((v) => [v, v]);
-    options(byId("pick-motion"), unique("motion", data.histories), current.motion);
-    const same = data.histories.filter((h) => h.motion === current.motion);
+    options(byId("pick-motion"), unique("motion", stored), current.motion);
+    const same = stored.filter((h) => h.motion === current.motion);
     options(byId("pick-controller"), unique("controller", same), current.controller);
     options(byId("pick-trial"),
       same.filter((h) => h.controller === current.controller)
@@ -258,8 +256,8 @@
     const motion = byId("pick-motion").value, controller = byId("pick-controller").value;
     const trial = +byId("pick-trial").value;
     show(find(controller, motion, trial) ||
-      data.histories.find((h) => h.motion === motion && h.controller === controller) ||
-      data.histories.find((h) => h.motion === motion));
+      stored.find((h) => h.motion === motion && h.controller === controller) ||
+      stored.find((h) => h.motion === motion));
   }
 
   function pickRow(row) {
@@ -274,9 +272,24 @@
     }
   }
 
-  buildTable();
-  if (data.histories.length) {
-    show(data.histories[0]);
+  // Plotly stands in the page compressed, at two fifths of its size.
+  async function unpack(id) {
+    const bytes = Uint8Array.from(atob(byId(id).textContent), (c) => c.charCodeAt(0));
+    const text = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const script = element("script", await new Response(text).text());
+    document.head.append(script);
+  }
+
+  async function drawHistories() {
+    try {
+      await unpack("plotly");
+    } catch (error) {
+      byId("plot").hidden = true;
+      byId("plot-note").textContent = `This browser cannot draw histories (${error.message}); ` +
+        "one of 2023 or later can.";
+      return;
+    }
+    show(stored[0]);
     plot.on("plotly_relayout", (change) => {
       if (Object.keys(change).some((k) => k.startsWith("xaxis.range"))) refine();
     });
@@ -284,9 +297,11 @@
     byId("zoom-out").addEventListener("click", zoomOut);
     ["pick-motion", "pick-controller", "pick-trial"].forEach((id) =>
       byId(id).addEventListener("change", picked));
-  } else {
-    byId("histories").hidden = true;
   }
+
+  buildTable();
   update();
+  if (stored.length) await drawHistories();
+  else byId("histories").hidden = true;
   document.documentElement.dataset.ready = "yes";
 })();

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import io
 import json
 from collections.abc import Callable, Sequence
@@ -15,7 +16,12 @@ import numpy as np
 from martths_jax.figures import drawings, open_source
 from martths_jax.files import atomic
 from martths_jax.report.beside import beside_html
-from martths_jax.report.payload import history_payload, trial_payload
+from martths_jax.report.payload import (
+    chosen_trials,
+    history_payload,
+    kept_signals,
+    trial_payload,
+)
 from martths_jax.report.tables import study_tables
 from martths_jax.study import Study
 from martths_jax.study.runner import read_provenance
@@ -23,6 +29,9 @@ from martths_jax.study.summary import Table, summarise
 
 #: Resolution of the figures in the page.
 DPI = 130
+#: Size of a page [bytes]: histories are thinned until it is kept, but for the least they get.
+SIZE = 9_800_000
+LEAST = 1_000_000
 
 
 def write_report(
@@ -69,25 +78,50 @@ def compose(study: Study, pictures: str, others: str = "") -> str:
     from plotly.offline import get_plotlyjs
 
     summary = summarise(study.dataset)
-    data = trial_payload(study) | {"histories": history_payload(study), "folder": str(study.folder)}
+    kept = kept_signals(study)
+    trials = chosen_trials(study, kept)
+    data = trial_payload(study, trials) | {"folder": str(study.folder)}
     paired = [t for t in summary.tables if " versus " in t.title]
     tables = [*study_tables(study.dataset), *paired]
     parts = {
         "TITLE": escape(summary.heading),
         "STYLE": _own("style.css"),
         "ENDS": _html_table(summary.tables[0], fold=False),
+        "SAMPLE": _sample_note(trials.size, int(study.dataset.sizes["trial"])),
         "TABLES": "\n".join(_html_table(t, fold=i > 0) for i, t in enumerate(tables)),
         "FIGURES": pictures,
         "BESIDE": others,
         "LINK": '<a href="#beside">Sweeps and tunings</a>' if others else "",
         "PROVENANCE": _provenance(study),
-        "PLOTLY": get_plotlyjs(),
-        # A closing tag inside the data would end the script element.
-        "DATA": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
+        "PLOTLY": _packed(get_plotlyjs()),
+        "DATA": _json(data),
         "SCRIPT": _own("app.js"),
     }
+    room = SIZE - sum(len(part.encode()) for part in parts.values())
+    fs = float(np.ravel(study.dataset.attrs["fs"])[0])
+    parts["HISTORIES"] = _json(history_payload(kept, fs, max(LEAST, room)))
     pieces = _own("page.html").split("%%")
     return "".join(parts[piece] if i % 2 else piece for i, piece in enumerate(pieces))
+
+
+def _json(data) -> str:
+    """JSON that may stand in a script element: whatever a name holds, no tag and no comment."""
+    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", r"\u003c")
+
+
+def _packed(text: str) -> str:
+    """A text compressed, in base64; the page's script unpacks it."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
+
+
+def _sample_note(shown: int, trials: int) -> str:
+    if shown == trials:
+        return ""
+    return (
+        f"<p class=note>{shown} of {trials} trials are in this table: the nominal plant, those "
+        "whose histories are kept, lost ones up to a quarter, and others drawn by the study's "
+        "seed. Tables and figures below are of all trials; study.csv lists all.</p>"
+    )
 
 
 def _own(name: str) -> str:

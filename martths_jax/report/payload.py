@@ -7,28 +7,72 @@ which is less than a line's width on any screen, at a seventh of the size of dec
 from __future__ import annotations
 
 import base64
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from martths_jax.indices import NAMES
 from martths_jax.report.tables import unit_of
 from martths_jax.study import Study
 from martths_jax.watch import Status
 
-#: Room for all histories in the file [bytes of base64].
-ROOM = 12_000_000
+#: Runs in the table of all trials, at most; of a larger study it holds a sample of the trials.
+RUNS = 12_000
 #: Coefficients change slowly: every so manieth of the samples kept of the other signals.
 SLOWER = 4
 STEPS = 32767
+#: What goes with a signal beside its values [bytes].
+HEAD = 150
 
 
-def trial_payload(study: Study) -> dict:
-    """Indices of all runs, column by column, six digits each; None where a trial diverged."""
+class Kept(NamedTuple):
+    """Stored signals of a controller on a motion, (kept, time, ...)."""
+
+    controller: str
+    motion: str
+    stored: xr.Dataset
+
+
+def kept_signals(study: Study) -> list[Kept]:
+    """All stored signals of a study; none if it has not kept any."""
+    if not (study.folder / "signals.nc").is_file():
+        return []
+    return [
+        Kept(str(c), str(m), study.signals(str(m), str(c)))
+        for m in study.dataset.motion.values
+        for c in study.dataset.controller.values
+    ]
+
+
+def chosen_trials(study: Study, kept: list[Kept], runs: int = RUNS) -> np.ndarray:
+    """Numbers of the trials in the table, ascending: all, or a sample of at most `runs` runs.
+
+    Always there are the nominal plant and the kept trials.  Of the rest at most a quarter are
+    trials that some run lost, if there are any, and the others are drawn from all; which ones
+    depends on the study's seed alone.
+    """
+    dataset = study.dataset
+    trials = int(dataset.sizes["trial"])
+    room = max(1, runs // (dataset.sizes["controller"] * dataset.sizes["motion"]))
+    if trials <= room:
+        return np.arange(trials)
+    order = np.random.default_rng(int(np.ravel(dataset.attrs["seed"])[0])).permutation(trials)
+    always = np.unique([0, *(int(t) for cell in kept for t in cell.stored.trial.values)])
+    lost = np.any(dataset.status.values >= Status.DIVERGED, axis=(0, 1))
+    some_lost = order[lost[order]][: room // 4]
+    wanted = np.concatenate([always, some_lost, order])
+    _, first = np.unique(wanted, return_index=True)
+    return np.sort(wanted[np.sort(first)][: max(room, always.size)])
+
+
+def trial_payload(study: Study, trials: np.ndarray) -> dict:
+    """Indices of the runs of some trials, column by column, six digits each; None if diverged."""
     dataset = study.dataset
     cells = []
     for controller in map(str, dataset.controller.values):
         for motion in map(str, dataset.motion.values):
-            cell = dataset.sel(controller=controller, motion=motion)
+            cell = dataset.sel(controller=controller, motion=motion).isel(trial=trials)
             cells.append({
                 "controller": controller,
                 "motion": motion,
@@ -38,7 +82,7 @@ def trial_payload(study: Study) -> dict:
     return {
         "indices": [{"name": n, "unit": unit_of(n)} for n in NAMES],
         "status": {int(s): s.name.lower() for s in Status},
-        "trials": int(dataset.sizes["trial"]),
+        "trials": trials.tolist(),
         "cells": cells,
     }
 
@@ -47,26 +91,24 @@ def _rounded(values: np.ndarray) -> list:
     return [float(f"{x:.6g}") if np.isfinite(x) else None for x in values.tolist()]
 
 
-def history_payload(study: Study, room: int = ROOM) -> list[dict]:
+def history_payload(kept: list[Kept], fs: float, room: int) -> list[dict]:
     """Histories of the kept trials, thinned so that all of them fit into `room` bytes.
+
+    Args:
+        kept: see ``kept_signals``.
+        fs: sampling rate [Hz].
+        room: for all histories in the file [bytes of base64].
 
     Returns:
         one mapping a controller, motion and kept trial: ``dt`` [s], and ``signals`` with ``name``,
         ``panel``, ``stride`` and the encoded values.
     """
-    if not (study.folder / "signals.nc").is_file():
-        return []
-    cells = [
-        (str(c), str(m), study.signals(str(m), str(c)))
-        for m in study.dataset.motion.values
-        for c in study.dataset.controller.values
-    ]
     full = sum(
         stored.sizes["time"] * 2 * 4 / 3 * _weight(stored) * stored.sizes["kept"]
-        for _, _, stored in cells
+        for _, _, stored in kept
     )
-    stride = max(1, int(np.ceil(full / room)))
-    fs = float(np.ravel(study.dataset.attrs["fs"])[0])
+    names = sum((7 + _coefficients(stored)) * HEAD * stored.sizes["kept"] for _, _, stored in kept)
+    stride = max(1, int(np.ceil(full / max(room - names, room / 4))))
     return [
         {
             "controller": controller,
@@ -77,15 +119,19 @@ def history_payload(study: Study, room: int = ROOM) -> list[dict]:
             "samples": int(stored.sizes["time"]),
             "signals": list(_signals(stored.isel(kept=k), stride)),
         }
-        for controller, motion, stored in cells
+        for controller, motion, stored in kept
         for k in range(stored.sizes["kept"])
     ]
 
 
 def _weight(stored) -> float:
     """Signals of a trial, in units of one that is not thinned further."""
-    slow = stored["C_A"].shape[2] * stored["C_A"].shape[3] / SLOWER if "C_A" in stored else 0
-    return 2 + 2 + stored["force"].shape[-1] + slow
+    return 2 + 2 + stored["force"].shape[-1] + _coefficients(stored) / SLOWER
+
+
+def _coefficients(stored) -> int:
+    """Number of a controller's coefficients."""
+    return stored["C_A"].shape[2] * stored["C_A"].shape[3] if "C_A" in stored else 0
 
 
 def _signals(run, stride: int):

@@ -11,6 +11,7 @@ import numpy as np
 from martths_jax.errors import argument_error, raise_all
 from martths_jax.indices import NAMES
 from martths_jax.plant import check_plants
+from martths_jax.runtime import check_runtime
 from martths_jax.sensitivity.design import Design, is_power_of_two, make_design, most_samples
 from martths_jax.sensitivity.results import Sensitivity, write_results
 from martths_jax.sensitivity.store import ROWS, SensitivityFolder
@@ -20,7 +21,7 @@ from martths_jax.study.engine import Outcome, choose_devices
 from martths_jax.study.memory import GB, choose_chunk, lane_bytes
 from martths_jax.study.plan import Plan, build_plan
 from martths_jax.study.progress import Reporter, Tally, compile_seconds
-from martths_jax.study.runner import Session, header, tell_notices
+from martths_jax.study.runner import Session, header
 from martths_jax.sweep.config import SHOWN
 from martths_jax.sweep.lanes import LaneEngine
 from martths_jax.text import counted
@@ -39,6 +40,7 @@ def run_sensitivity(
     reporter: Reporter | None = None,
     fresh: bool = False,
     figures: bool = True,
+    allow_mixed: bool = False,
     command_line: str = "run_sensitivity(...)",
     **changes,
 ) -> Sensitivity:
@@ -52,6 +54,7 @@ def run_sensitivity(
         reporter: is told about progress; nothing is said by default.
         fresh: start over, deleting the analysis in the folder.
         figures: draw the tornado charts.
+        allow_mixed: go on with results of machines that compile in another way.
         command_line: kept with the results.
         changes: settings that replace those of `config`.
 
@@ -62,28 +65,30 @@ def run_sensitivity(
         InputError: listing every setting that cannot be used, or saying what is in the way of the
             folder's files; what was finished stays.
     """
+    check_runtime()
     shown, reporter = tuple(dict.fromkeys(shown)), reporter or Reporter()
     plan, design = build(config, shown, changes)
     head = header(plan, command_line) | {"trials": design.rows - 1}
     head["identity"] |= {"factors": list(design.factors)}
-    run = SensitivityFolder.start(Path(plan.config.out), head, fresh)
-    engine = make_engine(plan, design, reporter)
-    session = Session(run, engine, command_line)
-    try:
-        run_rows(run, engine, design, reporter, session)
-    finally:
-        reporter.end()
-        session.save()
-    done = write_results(run, design, plan)
-    for text in done.warnings:
-        reporter.notice(text)
-    if figures:
-        from martths_jax.sensitivity.figures import draw_figures
+    with SensitivityFolder.start(
+        Path(plan.config.out), head, fresh, allow_mixed=allow_mixed, notice=reporter.notice
+    ) as run:
+        engine = make_engine(plan, design, reporter)
+        session = Session(run, engine, command_line)
+        try:
+            run_rows(run, engine, design, reporter, session)
+        finally:
+            reporter.end()
+            session.save()
+        done = write_results(run, design, plan)
+        for text in done.warnings:
+            reporter.notice(text)
+        if figures:
+            from martths_jax.sensitivity.figures import draw_figures
 
-        draw_figures(done, run.path / "figures", shown)
-    run.tidy()
-    session.save()
-    return done
+            draw_figures(done, run.path / "figures", shown)
+        session.save()
+        return done
 
 
 def build(config, shown: tuple[str, ...], changes: dict) -> tuple[Plan, Design]:
@@ -135,7 +140,8 @@ def make_engine(plan: Plan, design: Design, reporter: Reporter) -> LaneEngine:
         f"{counted(count, f'{devices[0].platform} device')}, about "
         f"{2 * chunk * lane_bytes(samples, plan.noise.channels) / GB:.2g} GB."
     )
-    tell_notices(plan.motions, reporter)
+    for text in plan.notices:
+        reporter.notice(text)
     return engine
 
 
@@ -144,7 +150,7 @@ def run_rows(run, engine: LaneEngine, design: Design, reporter: Reporter, sessio
     plan = engine.plan
     motions = [m.name for m in plan.motions]
     motion, streams = design.motions(len(motions)), design.streams()
-    done = {c: run.done(c, ROWS) for c in plan.controllers}
+    done = {c: run.done(c, ROWS, reporter.notice) for c in plan.controllers}
     reporter.begin({
         (c, name): Tally(int(np.sum(motion == i)), int(np.sum(done[c] & (motion == i))))
         for i, name in enumerate(motions) for c in plan.controllers

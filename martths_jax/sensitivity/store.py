@@ -16,14 +16,14 @@ class SensitivityFolder(RunFolder):
     own = (*OWN, *RESULTS)
     what = "sensitivity analysis"
 
-    def _continue(self, asked: dict) -> None:
+    def _continue(self, asked: dict, allow_mixed: bool, notice) -> None:
         each = len(asked["identity"]["factors"]) + 2
         if self.header["identity"].get("factors") == asked["identity"]["factors"]:
             there, here = ((h["trials"] + 1) // each for h in (self.header, asked))
             if here < there:
                 raise InputError(
                     f"{self.path} holds an analysis of N = {there} base samples, but {here} were "
-                    "asked for; it can be extended, not shortened.  Give another --out, or --fresh "
-                    "to start over."
+                    "asked for; it can be extended, not shortened.  Give another --out "
+                    "(`out`), or --fresh (`fresh=True`) to start over."
                 )
-        super()._continue(asked)
+        super()._continue(asked, allow_mixed, notice)

@@ -13,13 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
+from martths_jax.errors import argument_error
 from martths_jax.structure.frame import (
     FORCE_DOFS,
     Structure,
     independent_coordinate,
     rayleigh_coefficients,
 )
-from martths_jax.structure.sections import INCH
+from martths_jax.structure.sections import INCH, check_positive
 
 E_STEEL = 200e9  # Pa
 RHO_STEEL = 7850.0  # kg/m^3
@@ -45,6 +46,16 @@ class Quirks:
     removed_rotation_coupling: float = -1.0
     mass_factor: float = 1.1
     round_frequencies: bool = True
+
+    def __post_init__(self):
+        check_positive("removed_density", self.removed_density, "kg/m^3")
+        coupling = self.removed_rotation_coupling
+        if not isinstance(coupling, (int, float, np.number)) or not np.isfinite(coupling):
+            raise argument_error("removed_rotation_coupling", "be a finite number", repr(coupling))
+        check_positive("mass_factor", self.mass_factor, "1")
+        if not isinstance(self.round_frequencies, (bool, np.bool_)):
+            wanted = "be True or False"
+            raise argument_error("round_frequencies", wanted, repr(self.round_frequencies))
 
 
 @dataclass(frozen=True)

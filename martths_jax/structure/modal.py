@@ -11,6 +11,7 @@ so one step costs 4 n instead of n^2 products.  Trials stand on the last axis.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import jax
 import jax.numpy as jnp
@@ -38,6 +39,9 @@ class ModalSystem:
     B: jax.Array
     C: jax.Array
     D: jax.Array | None = None
+
+    #: Axes when all trials share the system; one more counts them (see ``Controller``).
+    shared_axes = MappingProxyType({"a": 2, "b": 2, "B": 3, "C": 3, "D": 2})
 
     @property
     def order(self) -> int:

@@ -8,8 +8,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from martths_jax.errors import argument_error
+
 INCH = 0.0254  # m
 KSI = 6.894757293168361e6  # Pa
+
+
+def check_positive(name: str, given, unit: str, shape: tuple = (), zero: bool = False) -> None:
+    """Refuse numbers that are not finite and positive (or zero, where `zero` allows it).
+
+    Raises:
+        InputError: naming the argument.
+    """
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        values = np.array(np.nan)
+    good = values.shape == shape and np.all(np.isfinite(values) & (values >= 0))
+    if not good or not (zero or np.all(values > 0)):
+        counted = f"{' x '.join(map(str, shape))} numbers" if shape else "a number"
+        wanted = f"be {counted} of at least zero" if zero else f"be {counted} above zero"
+        unit = "" if unit == "1" else f" ({unit})"
+        raise argument_error(name, wanted + unit, repr(given)[:80])
 
 
 @dataclass(frozen=True)
@@ -25,6 +47,11 @@ class Section:
     A: float
     I: float
     A_s: float
+
+    def __post_init__(self):
+        check_positive("A", self.A, "m^2", zero=True)
+        check_positive("I", self.I, "m^4")
+        check_positive("A_s", self.A_s, "m^2")
 
     @classmethod
     def from_inches(cls, A: float, I: float, A_s: float) -> Section:
@@ -79,3 +106,17 @@ class FrameGeometry:
             (1921.049719, 1921.049719, 1913.477049),
         )
     )
+
+    def __post_init__(self):
+        for name, unit in (("storey", "m"), ("bay", "m"), ("E", "Pa"), ("G", "Pa")):
+            check_positive(name, getattr(self, name), unit)
+        for name in ("column", "interior_ground_column", "beam", "interior_ground_beam"):
+            if not isinstance(getattr(self, name), Section):
+                got = type(getattr(self, name)).__name__
+                raise argument_error(name, "be a Section", got, "Use Section(A, I, A_s).")
+        check_positive("pin_offset", self.pin_offset, "m", zero=True)
+        if self.pin_offset >= self.storey:
+            wanted = f"be less than a storey, {self.storey:g} m"
+            raise argument_error("pin_offset", wanted, self.pin_offset)
+        check_positive("storey_mass", self.storey_mass, "kg", (3,))
+        check_positive("vertical_mass", self.vertical_mass, "kg", (4, 3))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -48,6 +49,8 @@ class StudyConfig:
     pga: str | float | None = None
     sa: str | None = None
     units: str | None = None
+    dt: float | None = None
+    variable: str | int | None = None
     resample: str = "linear"
     fs: float = 1024.0
     integrator: str = "newmark"
@@ -163,7 +166,8 @@ def read_toml(path: Path) -> dict:
     except RecursionError:
         raise InputError(f"Configuration {path} nests its brackets too deeply.") from None
     except ValueError as error:  # of TOML, of its encoding, or a number beyond all bounds
-        raise InputError(f"Configuration {path} is not valid TOML: {error}.") from None
+        hint = f" {_BACKSLASHES}" if _escapes(path) else ""
+        raise InputError(f"Configuration {path} is not valid TOML: {error}.{hint}") from None
     settings: dict = {}
     problems = unknown_names(sorted(set(document) - {*SECTIONS, "controller"}),
                         {*SECTIONS, "controller"}, "Table")  # fmt: skip
@@ -175,6 +179,10 @@ def read_toml(path: Path) -> dict:
         known = {f.name for f in FIELDS if f.section == section}
         problems += unknown_names(sorted(set(table) - known), known, f"Key in [{section}]")
         settings |= {k: v for k, v in table.items() if k in known}
+        problems += [
+            f"`{k}` in [{section}] holds {v!r:.80}, which is no path. {_BACKSLASHES}"
+            for k, v in table.items() if k in known and _has_control(v)
+        ]  # fmt: skip
     controller = document.get("controller", {})
     if not isinstance(controller, dict) or not all(
         isinstance(t, dict) for t in controller.values()
@@ -187,6 +195,23 @@ def read_toml(path: Path) -> dict:
     values = StudyConfig(**{k: _plain(v) for k, v in settings.items() if k in known})
     raise_all([*problems, *values.problems()], f"Configuration {path} cannot be used")
     return settings
+
+
+_BACKSLASHES = (
+    "In a path write / or put it in single quotes, 'C:\\records\\a.csv': between double quotes "
+    "TOML takes \\ for the start of a sign such as \\t."
+)
+
+
+def _escapes(path: Path) -> bool:
+    """Whether a file holds a backslash between double quotes."""
+    return re.search(rb'"[^"\n]*\\', path.read_bytes()) is not None
+
+
+def _has_control(value) -> bool:
+    """Whether a text, or one of a list, holds a tab or another sign that no path has."""
+    texts = value if isinstance(value, list) else [value]
+    return any(isinstance(text, str) and re.search(r"[\x00-\x1f]", text) for text in texts)
 
 
 def plain_value(name: str, value):

@@ -20,6 +20,7 @@ from martths_jax.errors import InputError
 from martths_jax.files import forgiving
 from martths_jax.indices import NAMES
 from martths_jax.plant import PARAMETERS, Plants
+from martths_jax.study.checksum import CHECKSUM, content_digest
 from martths_jax.study.engine import FIRSTS
 from martths_jax.study.files import writing
 from martths_jax.study.store import FORMAT, RunFolder
@@ -65,7 +66,7 @@ def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
     unit = ["ms" if name.startswith(("J1_", "J4_")) else "percent" for name in NAMES]
     variables = {
         "value": ((*cell, "index"), gather(lambda o: o.value), {
-            "long_name": "evaluation indices; NaN where the trial diverged"} | INDEX_UNITS),
+            "long_name": "evaluation indices; NaN where there is none, see status"} | INDEX_UNITS),
         "status": (cell, gather(lambda o: o.status), {
             "long_name": "how the trial ended"} | STATUS_FLAGS),
         "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
@@ -121,6 +122,7 @@ def attributes(run: RunFolder) -> dict:
         **{f"version_{name}": text for name, text in versions.items()},
         "git_commit": ", ".join(c for c in run.header["commits"] if c) or "not a checkout",
         "platform": run.header["platform"],
+        "machines": json.dumps(list(run.header["machines"].values())),
         "command_line": run.header["command_line"],
         "seed": int(identity["seed"]),
         "trials": int(run.trials),
@@ -141,6 +143,7 @@ def _shortened(text: str) -> str:
 def write_dataset(dataset: xr.Dataset, path: Path, group: str | None = None) -> None:
     """Write a dataset into a file that is not yet in its place (see ``files.writing``)."""
     stored = dataset.copy()
+    stored.attrs[CHECKSUM] = content_digest(dataset)
     for name, variable in stored.variables.items():
         attrs = variable.attrs
         if variable.dtype.kind == "U":
@@ -196,8 +199,9 @@ def read_dataset(path: Path, group: str | None = None) -> xr.Dataset:
     try:
         with xr.open_dataset(path, engine="h5netcdf", group=group) as file:
             dataset = file.load()
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"{path} cannot be read as a study's results ({error}).") from None
+    except Exception as error:  # a damaged file makes HDF5 and its readers raise nearly anything
+        why = str(error).splitlines()[0][:120] if str(error) else repr(error)
+        raise _damaged(path, why) from None
     for name, variable in dataset.variables.items():
         # Characters come as text, and as bytes from files that do not say their encoding.
         if variable.dtype.kind in "SO":
@@ -210,4 +214,16 @@ def read_dataset(path: Path, group: str | None = None) -> xr.Dataset:
             f"{path} has format {found}, this version reads format {FORMAT}; use the version that "
             "wrote it."
         )
+    written = dataset.attrs.pop(CHECKSUM, None)
+    if written is None:
+        raise _damaged(path, "it has no checksum, or an earlier version wrote it")
+    if written != content_digest(dataset):
+        raise _damaged(path, "its content is not what its checksum says")
     return dataset
+
+
+def _damaged(path: Path, why: str) -> InputError:
+    return InputError(
+        f"{path} is damaged ({why}); repeat the command that wrote it, which computes again what "
+        "is missing and writes it anew."
+    )

@@ -15,10 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from martths_jax.errors import InputError
-from martths_jax.indices import NAMES, indices
+from martths_jax.indices import NAMES, final_indices
+from martths_jax.runtime import check_precision
 from martths_jax.simulation import (
     LANES,
-    Result,
     Setup,
     draw_on,
     fill,
@@ -27,7 +27,7 @@ from martths_jax.simulation import (
     run_block,
 )
 from martths_jax.study.plan import Plan
-from martths_jax.watch import NEVER
+from martths_jax.watch import NEVER, Status, status_of
 
 #: First samples that a ``Watch`` holds, by the name they have in the results.
 FIRSTS = ("saturated", "command", "stroke", "nonfinite")
@@ -120,6 +120,7 @@ class Engine:
         plants = self.plan.draws.plants(trial)
 
         def compile_one(setup: Setup) -> None:
+            check_precision()  # a block `with jax.enable_x64()` does not reach this thread
             # A motion of one sample: the programs do not depend on its length.
             brief = replace(setup, ground=setup.ground[:1], reference=setup.reference[:1])
             run_block(brief, plants, noise, which, self.devices, keep=False, retry=False)
@@ -174,12 +175,12 @@ class Engine:
         # As many trials in every block, so that the few operations here compile once.
         lanes = fill(np.arange(trial.size), self.block)
         sums, watch = jax.tree.map(lambda x: np.asarray(x)[..., lanes], (sums, watch))
-        result = Result(sums, watch, {}, setup.reference, trial[lanes], setup.benchmark.fs, "", "")
-        found = indices(result)
+        status = np.asarray(status_of(watch, sums))
+        found = final_indices(sums, status >= Status.DIVERGED)
         first = np.stack([np.asarray(getattr(watch, name)) for name in FIRSTS])
         whole = Outcome(
             value=np.stack([found[name] for name in NAMES], axis=-1),
-            status=result.status.astype(np.int32),
+            status=status.astype(np.int32),
             first=np.moveaxis(np.where(first >= NEVER, np.nan, first), -1, 0),
             volt_peak=np.asarray(watch.volt_peak).T,
             held=np.asarray(watch.held).astype(np.int32),

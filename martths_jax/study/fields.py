@@ -107,6 +107,10 @@ FIELDS = (
           "Scale to this 5 %-damped spectral acceleration instead, such as 0.3g@2.29Hz."),
     Field("units", "motions", optional(one_of(("g", "m/s2", "cm/s2"))), _choice(
           ("g", "m/s2", "cm/s2")), "Unit of files that do not say theirs."),
+    Field("dt", "motions", optional(is_positive), "be a positive time step [s]",
+          "Time step of files that do not say theirs [s]."),
+    Field("variable", "motions", optional(lambda v: _is_text(v) or is_whole(v, 1)),
+          "be the name or number of a column", "Column, channel or array of files with several."),
     Field("resample", "motions", one_of(("linear", "bandlimited")),
           _choice(("linear", "bandlimited")), "How records come to the sampling rate."),
     Field("fs", "model", is_positive, "be a positive sampling rate [Hz]", "Sampling rate [Hz]."),

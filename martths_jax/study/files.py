@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
-import time
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -54,30 +55,32 @@ def writing(path: Path) -> Iterator[Path]:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file whole (see ``writing``)."""
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file whole (see ``writing``)."""
     with writing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_bytes(content)
 
 
-@contextmanager
-def alone(path: Path, patience: float = 5.0) -> Iterator[None]:
-    """Keep other processes that use this out of a block; a lock left by a killed one is broken."""
-    lock = path.with_name(f".{path.name}.part.lock")
-    deadline = time.monotonic() + patience
-    while True:
-        try:
-            os.close(os.open(lock, os.O_CREAT | os.O_EXCL))
-            break
-        except FileExistsError:
-            if time.monotonic() > deadline:
-                break
-            time.sleep(0.02)
-    try:
-        yield
-    finally:
-        lock.unlink(missing_ok=True)
+def set_aside(path: Path) -> Path:
+    """Rename a file that is damaged, so that another can take its place; its new path.
+
+    Raises:
+        InputError: if the disk refuses.
+    """
+    taken = {p.name for p in damaged_files(path)}
+    numbers = (f"-{i}" if i > 1 else "" for i in range(1, len(taken) + 2))
+    name = next(n for i in numbers if (n := f"{path.name}.damaged{i}") not in taken)
+    with disk_errors(path):
+        os.replace(path, path.with_name(name))
+    return path.with_name(name)
 
 
-def remove_leftovers(folder: Path) -> None:
-    """Delete the temporary files of processes that were killed."""
-    for temporary in folder.rglob(".*.part*"):
-        temporary.unlink(missing_ok=True)
+def damaged_files(path: Path) -> list[Path]:
+    """What ``set_aside`` left of a file."""
+    pattern = re.compile(re.escape(path.name) + r"\.damaged(-\d+)?")
+    with contextlib.suppress(OSError):
+        return [p for p in path.parent.iterdir() if pattern.fullmatch(p.name)]
+    return []

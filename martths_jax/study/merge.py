@@ -11,6 +11,7 @@ from martths_jax.errors import InputError, raise_all
 from martths_jax.study import provenance
 from martths_jax.study.config import make_config
 from martths_jax.study.files import write_text, writing
+from martths_jax.study.machine import MIXED_NOTE
 from martths_jax.study.plan import build_plan
 from martths_jax.study.progress import Reporter
 from martths_jax.study.results import Study
@@ -25,6 +26,7 @@ def merge_runs(
     records: str | None = None,
     signals: bool = True,
     keep: Sequence[int] = (),
+    allow_mixed: bool = False,
     reporter: Reporter | None = None,
 ) -> Study:
     """Join the shares of a study and write its results.
@@ -35,6 +37,7 @@ def merge_runs(
         records: where the ground motions are here, for the signals.
         signals: run the chosen trials again for their signals.
         keep: further trials whose signals are stored.
+        allow_mixed: join shares of machines that compile in another way.
         reporter: is told what happens.
 
     Raises:
@@ -43,32 +46,48 @@ def merge_runs(
     """
     out, reporter = Path(out), reporter or Reporter()
     shares = [RunFolder.open(Path(folder)) for folder in folders]
-    run = RunFolder.open(out) if not shares else RunFolder.start(out, shares[0].header)
+    first = shares[0] if shares else RunFolder.open(out)
     problems = []
     for share in shares:
-        found = provenance.differences(run.header["identity"], share.header["identity"])
-        if share.trials != run.trials:
-            found.append(f"trials: {run.trials!r} in {out}, {share.trials!r} there")
+        found = provenance.differences(first.header["identity"], share.header["identity"])
+        if share.trials != first.trials:
+            found.append(f"trials: {first.trials!r} in {first.path}, {share.trials!r} there")
         problems += [f"{share.path} holds another study: {text}." for text in found]
     raise_all(problems, "The folders cannot be merged")
-    for share in shares:
-        if share.path.resolve() != out.resolve():
-            _copy(share, run)
-    raise_all(run.missing(), f"{out} is not complete")
-    engine = engine_again(run, records, keep, reporter) if signals else None
-    return finish(run, engine, reporter)
+    machines = {k: v for share in (first, *shares) for k, v in share.header["machines"].items()}
+    if len(machines) > 1 and not allow_mixed:
+        raise InputError(_mixed(machines))
+    head = first.header | {"machines": machines}
+    with RunFolder.start(out, head, allow_mixed=allow_mixed, notice=reporter.notice) as run:
+        for share in shares:
+            if share.path.resolve() != out.resolve():
+                _copy(share, run, reporter)
+        raise_all(run.missing(), f"{out} is not complete")
+        engine = engine_again(run, records, keep, reporter) if signals else None
+        if len(machines) > 1:
+            mixed = f"Results of {len(machines)} kinds of machines are mixed."
+            reporter.notice(f"{mixed}  {MIXED_NOTE}")
+        return finish(run, engine, reporter)
 
 
-def _copy(share: RunFolder, run: RunFolder) -> None:
+def _mixed(machines: dict) -> str:
+    one, other = list(machines.values())[:2]
+    return (
+        "The shares were computed on machines that compile in another way, so their last bits are "
+        f"of two kinds: {'; '.join(provenance.differences(one, other, 'machine.'))}.  Merge them "
+        f"all the same with --allow-mixed (`allow_mixed=True`).  {MIXED_NOTE}"
+    )
+
+
+def _copy(share: RunFolder, run: RunFolder, reporter: Reporter) -> None:
     for controller, motion in share.cells:
+        share.done(controller, motion, reporter.notice)  # sets aside what is damaged
         for _, _, path in share.parts(controller, motion):
             target = run.folder(controller, motion) / path.name
             if not target.exists():
                 with writing(target) as temporary:
                     shutil.copyfile(path, temporary)
-    if (share.path / PLANTS).exists() and not (run.path / PLANTS).exists():
-        with writing(run.path / PLANTS) as temporary:
-            shutil.copyfile(share.path / PLANTS, temporary)
+    run.keep_draws(share.draws())
     sessions = read_provenance(run.path)["sessions"]
     sessions += [s for s in read_provenance(share.path)["sessions"] if s not in sessions]
     write_text(run.path / "provenance.json", json.dumps({"sessions": sessions}, indent=1))

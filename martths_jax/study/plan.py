@@ -7,7 +7,6 @@ import hashlib
 import inspect
 from dataclasses import dataclass
 
-import jax
 import numpy as np
 
 from martths_jax.benchmark import Benchmark, build_benchmark
@@ -17,8 +16,10 @@ from martths_jax.files import name_problems
 from martths_jax.motions import BUILTIN_NAMES, Motion, load_motion
 from martths_jax.motions.catalogue import BENCHMARK_NAMES, record_files
 from martths_jax.sensors import SensorNoise
+from martths_jax.simulation import prepare
 from martths_jax.study.config import StudyConfig, unknown_names
 from martths_jax.study.draws import Draws, make_draws
+from martths_jax.study.sources import code_of, without_source
 
 #: Kinds of controllers a configuration can name, and what makes them from their settings.
 KINDS = {"lqg": LQG.design, "adfc": ADFC, "passthrough": Passthrough}
@@ -53,6 +54,20 @@ class Plan:
         """Number of uncertain plants; trial 0, the nominal plant, comes on top."""
         return self.draws.trials
 
+    @property
+    def notices(self) -> list[str]:
+        """Sentences a user should read before it runs."""
+        found = [text for motion in self.motions for text in motion.notices]
+        for name, settings in self.controller_settings.items():
+            unknown = without_source(settings.get("code", {}))
+            if unknown:
+                found.append(
+                    f"Controller {name!r}: the source of {', '.join(unknown)} cannot be found, so "
+                    "these results can be neither resumed nor extended nor merged; define it with "
+                    "`def` in a file to have that."
+                )
+        return found
+
 
 def build_plan(config: StudyConfig) -> Plan:
     """Build and load everything a configuration names.
@@ -77,6 +92,7 @@ def build_plan(config: StudyConfig) -> Plan:
             made = attempt(build_controller, given, config, benchmark)
             if made is not None:
                 name, controllers[name], settings[name] = given_name(given), *made
+                attempt(prepare, made[0], benchmark, 1)
     draws = attempt(make_draws, config)
     if draws is not None and any(trial > draws.trials for trial in config.keep):
         problems.append(
@@ -129,6 +145,8 @@ def study_motion(given, config: StudyConfig) -> Motion:
         pga=config.pga,
         sa=config.sa,
         resample=config.resample,
+        dt=config.dt,
+        variable=config.variable,
     )
 
 
@@ -154,7 +172,7 @@ def build_controller(given, config: StudyConfig, benchmark: Benchmark) -> tuple[
         InputError: an unknown kind or setting, or a value the controller refuses.
     """
     if isinstance(given, Controller):
-        return given, {"kind": type(given).__name__, "sha256": _fingerprint(given)}
+        return given, {"kind": type(given).__name__, "code": code_of(given)}
     table = dict(config.controller.get(given, {}))
     kind = table.pop("kind", given)
     if kind not in KINDS:
@@ -183,15 +201,6 @@ def _named(controller: Controller, name: str) -> Controller:
     # The name is a class attribute, not a field, so that it stays out of the compiled program.
     object.__setattr__(controller, "name", name)
     return controller
-
-
-def _fingerprint(controller: Controller) -> str:
-    leaves, tree = jax.tree.flatten(controller)
-    digest = hashlib.sha256(str(tree).encode())
-    for leaf in leaves:
-        array = np.asarray(leaf)
-        digest.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
-    return digest.hexdigest()
 
 
 def motion_identity(motion: Motion) -> dict:

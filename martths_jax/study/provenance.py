@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import datetime
+import hashlib
+import json
 import platform
 import shlex
 import subprocess
@@ -10,12 +12,14 @@ import sys
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 
 import martths_jax
 from martths_jax.study.config import as_settings
 from martths_jax.study.fields import RUN_ONLY
 from martths_jax.study.plan import Plan, motion_identity
+from martths_jax.study.sources import UNKNOWN, engine_code
 
 #: Packages whose version can change the last bits of a result.
 PACKAGES = ("jax", "jaxlib", "numpy", "scipy")
@@ -62,7 +66,8 @@ def machine() -> str:
 _NOT_IN_COMMAND = {
     "--out": True, "--fresh": False, "--quiet": False, "--devices": True, "--shard": True,
     "--coordinator": True, "--process-id": True, "--num-processes": True, "--distributed": False,
-    "--memory": True, "--max-failed": True,
+    "--memory": True, "--max-failed": True, "--allow-mixed": False,
+    "--join-timeout": True, "--lost-timeout": True,
 }  # fmt: skip
 
 
@@ -92,8 +97,8 @@ def identity(plan: Plan) -> dict:
     it, unless the plants depend on it (Latin hypercube, Sobol', CSV).
     """
     settings = as_settings(plan.config)
-    loaded = {"records", "motions", "scale", "pga", "sa", "units", "resample", "trials",
-              "plants", "plants_as", "controller", "controllers"}  # fmt: skip
+    loaded = {"records", "motions", "scale", "pga", "sa", "units", "dt", "variable", "resample",
+              "trials", "plants", "plants_as", "controller", "controllers"}  # fmt: skip
     found = {k: v for k, v in settings.items() if k not in loaded | RUN_ONLY}
     if plan.draws.table is not None:
         found |= {"trials": plan.trials, "plants_sha256": plan.draws.sha256}
@@ -102,7 +107,14 @@ def identity(plan: Plan) -> dict:
     found["motions"] = [m.name for m in plan.motions]
     found["motion"] = {m.name: motion_identity(m) for m in plan.motions}
     found["versions"] = versions()
+    found["precision"] = str(np.dtype(jnp.zeros(()).dtype))
+    found["code"] = engine_code()
     return found
+
+
+def digest(identity) -> str:
+    """SHA-256 of what JSON can hold."""
+    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
 
 def differences(stored: dict, asked: dict, prefix: str = "") -> list[str]:
@@ -113,8 +125,19 @@ def differences(stored: dict, asked: dict, prefix: str = "") -> list[str]:
         if isinstance(there, dict) and isinstance(here, dict):
             found += differences(there, here, f"{prefix}{key}.")
         elif there != here and not (_is_nan(there) and _is_nan(here)):
-            found.append(f"{prefix}{key}: {there!r} in the folder, {here!r} asked for")
+            found.append(f"{prefix}{key}: {_difference(there, here)}")
     return found
+
+
+def _difference(there, here) -> str:
+    """What two values of a key are, short where they are long lists of words."""
+    if any(isinstance(x, str) and x.startswith(UNKNOWN) for x in (there, here)):
+        return "its source cannot be found, so it may have changed since"
+    if isinstance(there, str) and isinstance(here, str) and len(there) + len(here) > 200:
+        one, other = there.split(), here.split()
+        there = " ".join(w for w in one if w not in other)
+        here = " ".join(w for w in other if w not in one)
+    return f"{there!r} in the folder, {here!r} asked for"
 
 
 def _is_nan(value) -> bool:

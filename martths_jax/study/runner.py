@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import secrets
 import socket
 import time
-from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -14,15 +14,18 @@ import xarray as xr
 
 from martths_jax.errors import InputError
 from martths_jax.motions import Motion
+from martths_jax.runtime import check_runtime
 from martths_jax.simulation import LANES
 from martths_jax.study import provenance
 from martths_jax.study.config import StudyConfig, as_settings, make_config
 from martths_jax.study.dataset import assemble, save_dataset
-from martths_jax.study.distributed import wait_for_all
+from martths_jax.study.distributed import Meeting
 from martths_jax.study.engine import Engine, choose_devices
 from martths_jax.study.export import write_csv
-from martths_jax.study.files import alone, write_text
+from martths_jax.study.files import disk_errors, set_aside, write_text
+from martths_jax.study.machine import machine_digest, machine_identity
 from martths_jax.study.memory import GB, check_results, choose_chunk, lane_bytes
+from martths_jax.study.owner import door
 from martths_jax.study.plan import Plan, build_plan
 from martths_jax.study.progress import Reporter, Tally, compile_seconds
 from martths_jax.study.results import Study
@@ -40,7 +43,8 @@ def run_study(
     reporter: Reporter | None = None,
     fresh: bool = False,
     share: tuple[int, int] | None = None,
-    together: bool = False,
+    together: Meeting | None = None,
+    allow_mixed: bool = False,
     command_line: str = "run_study(...)",
     **changes,
 ) -> Study | None:
@@ -52,8 +56,10 @@ def run_study(
         fresh: start over, deleting the run in the folder.
         share: (i, n): run only the i-th of n shares, i from 1; ``merge_runs`` makes the results
             once all shares are there.
-        together: the shares run at the same time under JAX's distributed runtime
-            (``distributed.join``) and see the same folder; the first one writes the results.
+        together: the processes that run the shares at the same time (``distributed.join``) and see
+            the same folder; the first one writes the results.
+        allow_mixed: go on with results of machines that compile in another way, whose last digits
+            are others.
         command_line: kept with the results.
         changes: settings that replace those of `config`.
 
@@ -64,6 +70,7 @@ def run_study(
         InputError: listing every setting that cannot be used, or saying what is in the way of
             the folder's files; what was finished stays.
     """
+    check_runtime()
     config = make_config(config, **changes)
     if fresh and share is not None:
         raise InputError(
@@ -74,20 +81,23 @@ def run_study(
     if share is None:
         check_results(plan.trials + 1, len(plan.controllers) * len(plan.motions))
     reporter = reporter or Reporter()
-    run = RunFolder.start(Path(config.out), header(plan, command_line), fresh)
-    run.keep_draws(plan.draws)
-    engine = make_engine(plan, reporter)
-    session = Session(run, engine, command_line)
-    try:
-        run_chunks(run, engine, reporter, session, share_of(plan.trials + 1, share))
-    finally:
-        reporter.end()
-        session.save()
-    if together:
-        wait_for_all(run, reporter)
-    if share is not None and not (together and share[0] == 1):
-        return None
-    return finish(run, engine, reporter, session)
+    with RunFolder.start(
+        Path(config.out), header(plan, command_line), fresh, shared=share is not None,
+        allow_mixed=allow_mixed, notice=reporter.notice,
+    ) as run:  # fmt: skip
+        run.keep_draws(plan.draws)
+        engine = make_engine(plan, reporter)
+        session = Session(run, engine, command_line)
+        try:
+            run_chunks(run, engine, reporter, session, share_of(plan.trials + 1, share))
+        finally:
+            reporter.end()
+            session.save()
+        if together is not None:
+            together.finish(reporter)
+        if share is not None and not (together is not None and share[0] == 1):
+            return None
+        return finish(run, engine, reporter, session)
 
 
 def header(plan: Plan, command_line: str) -> dict:
@@ -98,7 +108,7 @@ def header(plan: Plan, command_line: str) -> dict:
         "controllers": list(plan.controllers),
         "motions": [m.name for m in plan.motions] if config.motions is None
         else [m.name if isinstance(m, Motion) else m for m in config.motions],
-        "controller": {k: v for k, v in plan.controller_settings.items() if "sha256" not in v},
+        "controller": {k: v for k, v in plan.controller_settings.items() if "code" not in v},
     }  # fmt: skip
     # Where and how it runs is in provenance.json: the results must not depend on it.
     for name in ("out", "devices", "memory_gb", "max_failed", "keep", "signals"):
@@ -106,6 +116,7 @@ def header(plan: Plan, command_line: str) -> dict:
     return {
         "trials": plan.trials,
         "identity": provenance.identity(plan),
+        "machines": {machine_digest(): machine_identity()},
         "config": settings,
         "command_line": command_line,
         "commits": [provenance.git_commit()],
@@ -127,15 +138,9 @@ def make_engine(plan: Plan, reporter: Reporter) -> Engine:
         f"{counted(count, f'{devices[0].platform} device')}, in chunks of {chunk} trials "
         f"(about {size / GB:.2g} GB)."
     )
-    tell_notices(plan.motions, reporter)
+    for text in plan.notices:
+        reporter.notice(text)
     return engine
-
-
-def tell_notices(motions: Iterable[Motion], reporter: Reporter) -> None:
-    """Pass on what was noticed while the motions were loaded."""
-    for motion in motions:
-        for text in motion.notices:
-            reporter.notice(text)
 
 
 class Session:
@@ -152,7 +157,8 @@ class Session:
             "trials": 0,
         }
         self.about["process"] = os.getpid()
-        self.name = {k: self.about[k] for k in ("started", "host", "process")}
+        self.about["session"] = secrets.token_hex(4)  # hosts may share process numbers
+        self.name = {k: self.about[k] for k in ("started", "host", "process", "session")}
         self.compiled = compile_seconds()
 
     def save(self) -> None:
@@ -162,20 +168,29 @@ class Session:
             "wall_seconds": round(time.monotonic() - self.started, 3),
             "compile_seconds": round(compile_seconds() - self.compiled, 3),
         }
+        if self.run.owner is not None and not self.run.owner.claim.stands():
+            return  # the folder is gone, or another run's
         path = self.run.path / "provenance.json"
         same = lambda s: all(s.get(k) == v for k, v in self.name.items())  # noqa: E731
-        with alone(path):  # processes of one study end at the same time
-            sessions = read_provenance(self.run.path)["sessions"]
+        with disk_errors(path), door(self.run.path):  # processes of one study end at the same time
+            sessions = read_provenance(self.run.path, aside=True)["sessions"]
             sessions = [s for s in sessions if not same(s)] + [self.about]
             write_text(path, json.dumps({"sessions": sessions}, indent=1))
 
 
-def read_provenance(folder: Path) -> dict:
-    """Sessions of a run so far; none if the file is not there or was damaged."""
+def read_provenance(folder: Path, aside: bool = False) -> dict:
+    """Sessions of a run so far; none if the file is not there or damaged (then it is set `aside`,
+    so that what can still be read of it is not overwritten)."""
+    file = folder / "provenance.json"
     try:
-        found = json.loads((folder / "provenance.json").read_text("utf-8"))
-        return {"sessions": list(found["sessions"])}
-    except (OSError, ValueError, KeyError, TypeError):
+        found = json.loads(file.read_text("utf-8"))
+        sessions = list(found["sessions"])
+        if not all(isinstance(s, dict) for s in sessions):
+            raise ValueError("no list of sessions")
+        return {"sessions": sessions}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        if aside and file.is_file():
+            set_aside(file)
         return {"sessions": []}
 
 
@@ -198,7 +213,7 @@ def share_of(trials: int, share: tuple[int, int] | None) -> np.ndarray:
 def run_chunks(run: RunFolder, engine: Engine, reporter, session, mine: np.ndarray) -> None:
     """Run whatever of the trials `mine` is not stored yet, chunk by chunk."""
     mine = np.append(mine, np.zeros(max(0, run.trials + 1 - mine.size), dtype=bool))
-    todo = {cell: mine & ~run.done(*cell) for cell in run.cells}
+    todo = {cell: mine & ~run.done(*cell, reporter.notice) for cell in run.cells}
     reporter.begin({
         cell: Tally(int(mine.sum()), int(mine.sum() - left.sum())) for cell, left in todo.items()
     })  # fmt: skip
@@ -237,8 +252,8 @@ def finish(
     dataset = write_results(run)
     if engine is not None and engine.plan.config.signals:
         reporter.notice("Running the chosen trials again for their signals.")
-        store_signals(engine, dataset, run.path / "signals.nc", engine.plan.config.keep)
-    run.tidy()
+        keep = engine.plan.config.keep
+        store_signals(engine, dataset, run.path / "signals.nc", keep, run.digest)
     if session is not None:
         session.save()
     return Study(dataset, run.path)

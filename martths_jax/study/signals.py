@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from martths_jax.errors import InputError
 from martths_jax.files import safe_name
 from martths_jax.indices import NAMES
 from martths_jax.simulation import FEW
@@ -62,8 +63,13 @@ def choose_trials(dataset: xr.Dataset, controller: str, motion: str, keep) -> di
     return {trial: "+".join(names) for trial, names in roles.items()}
 
 
-def store_signals(engine: Engine, dataset: xr.Dataset, path: Path, keep) -> None:
+def store_signals(engine: Engine, dataset: xr.Dataset, path: Path, keep, identity: str) -> None:
     """Run the chosen trials again and write their signals, whole or not at all.
+
+    Args:
+        engine: of the study; dataset: its results.
+        path: the file; keep: trials that are stored beside the chosen ones.
+        identity: digest of what decides the study's numbers.
 
     Raises:
         InputError: if the disk refuses.
@@ -73,9 +79,9 @@ def store_signals(engine: Engine, dataset: xr.Dataset, path: Path, keep) -> None
         for m in dataset.motion.values
         for c in dataset.controller.values
     }
-    asked = json.dumps([dataset.attrs["identity"], [[*k, v] for k, v in chosen.items()]])
+    asked = json.dumps([identity, [[*k, v] for k, v in chosen.items()]])
     label = hashlib.sha256(asked.encode()).hexdigest()
-    if path.exists() and _label(path) == label:
+    if path.exists() and _is_whole(path, label, chosen):
         return
     for cell in chosen:
         engine.setup(*cell)  # before the threads start
@@ -107,11 +113,17 @@ def group(motion: str, controller: str | None = None) -> str:
     return "/" + "/".join(safe_name(n) for n in (motion, controller) if n is not None)
 
 
-def _label(path: Path) -> str | None:
+def _is_whole(path: Path, label: str, chosen) -> bool:
+    """Whether a file holds the signals that were asked for, and every bit of them is right."""
+    motions = {m for _, m in chosen}
     try:
-        return str(read_dataset(path).attrs.get("label"))
-    except ValueError:  # another version's or a damaged file: written anew
-        return None
+        if read_dataset(path).attrs.get("label") != label:
+            return False
+        for name in [*(group(m) for m in motions), *(group(m, c) for c, m in chosen)]:
+            read_dataset(path, name)
+    except InputError:  # another version's or a damaged file: written anew
+        return False
+    return True
 
 
 def _shared(engine: Engine, motion: str) -> xr.Dataset:

@@ -11,6 +11,7 @@ import numpy as np
 
 from martths_jax.errors import InputError, raise_all
 from martths_jax.plant import check_plants
+from martths_jax.runtime import check_runtime
 from martths_jax.simulation import LANES, Setup, prepare
 from martths_jax.study.config import StudyConfig
 from martths_jax.study.draws import Draws
@@ -18,7 +19,7 @@ from martths_jax.study.engine import Outcome, choose_devices
 from martths_jax.study.memory import GB, choose_chunk, lane_bytes
 from martths_jax.study.plan import Plan, build_controller, build_plan, motion_identity
 from martths_jax.study.progress import Reporter, Tally, compile_seconds
-from martths_jax.study.runner import Session, header, tell_notices
+from martths_jax.study.runner import Session, header
 from martths_jax.sweep.config import SHOWN, SweepConfig, make_sweep
 from martths_jax.sweep.grid import Job, job_config
 from martths_jax.sweep.lanes import LaneEngine, Worlds
@@ -40,6 +41,7 @@ def run_sweep(
     reporter: Reporter | None = None,
     fresh: bool = False,
     figures: bool = True,
+    allow_mixed: bool = False,
     command_line: str = "run_sweep(...)",
     **changes,
 ) -> Sweep:
@@ -53,6 +55,7 @@ def run_sweep(
         reporter: is told about progress; nothing is said by default.
         fresh: start over, deleting the sweep in the folder.
         figures: draw them.
+        allow_mixed: go on with results of machines that compile in another way.
         command_line: kept with the results.
         changes: settings that replace those of `config`.
 
@@ -63,6 +66,7 @@ def run_sweep(
         InputError: listing everything that cannot be used, before anything runs; or saying what is
             in the way of the folder's files; what was finished stays.
     """
+    check_runtime()
     if not isinstance(axes, SweepConfig):
         axes = make_sweep(axes, config, shown=shown, **changes)
     sweep, reporter = axes, reporter or Reporter()
@@ -71,24 +75,25 @@ def run_sweep(
     head = header(base, command_line)
     head["identity"] |= sweep_identity(sweep) | {"rates": _rates(sweep, worlds)}
     head["config"] |= sweep_identity(sweep)
-    run = SweepFolder.start(folder, head, fresh)
-    run.keep_draws(base.draws)
-    engine = make_engine(base, worlds, sweep, reporter)
-    session = Session(run, engine, command_line)
-    try:
-        run_jobs(run, engine, sweep, worlds, ready, reporter, session)
-    finally:
-        reporter.end()
-        session.save()
-    done = write_results(run, sweep)
-    if figures:
-        from martths_jax.sweep.figures import draw_figures
+    with SweepFolder.start(
+        folder, head, fresh, allow_mixed=allow_mixed, notice=reporter.notice
+    ) as run:
+        run.keep_draws(base.draws)
+        engine = make_engine(base, worlds, sweep, reporter)
+        session = Session(run, engine, command_line)
+        try:
+            run_jobs(run, engine, sweep, worlds, ready, reporter, session)
+        finally:
+            reporter.end()
+            session.save()
+        done = write_results(run, sweep)
+        if figures:
+            from martths_jax.sweep.figures import draw_figures
 
-        reporter.notice("Drawing the figures.")
-        draw_figures(done, folder / "figures", sweep.shown)
-    run.tidy()
-    session.save()
-    return done
+            reporter.notice("Drawing the figures.")
+            draw_figures(done, folder / "figures", sweep.shown)
+        session.save()
+        return done
 
 
 def build(sweep: SweepConfig) -> tuple[Plan, Worlds, dict[Job, object]]:
@@ -161,7 +166,8 @@ def make_engine(base: Plan, worlds: Worlds, sweep: SweepConfig, reporter: Report
                 f"{controller} has not all of the axes: its {len(jobs)} cells make "
                 f"{counted(len(set(jobs)), 'distinct one')}, and each is run once."
             )
-    tell_notices(base.motions, reporter)
+    for text in base.notices:
+        reporter.notice(text)
     return engine
 
 
@@ -169,7 +175,10 @@ def run_jobs(run, engine: LaneEngine, sweep: SweepConfig, worlds, ready, reporte
     """Run whatever is not stored yet, batch by batch of cells, chunk by chunk of trials."""
     trials, batches = run.trials + 1, sweep.grid.batches()
     motions = [m.name for m in engine.plan.motions]
-    done = {(job, m): run.done(job.label, m) for b in batches for job in b for m in motions}
+    done = {
+        (job, m): run.done(job.label, m, reporter.notice)
+        for batch in batches for job in batch for m in motions
+    }  # fmt: skip
     cells = {(c, m): Tally(0, 0) for m in motions for c in sweep.grid.jobs}
     for (job, motion), finished in done.items():
         tally = cells[job.controller, motion]

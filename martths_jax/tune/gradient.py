@@ -17,7 +17,7 @@ from martths_jax.benchmark import Benchmark
 from martths_jax.errors import argument_error
 from martths_jax.motions import Motion
 from martths_jax.plant import Plants
-from martths_jax.runtime import compiler_options
+from martths_jax.runtime import check_runtime, compiler_options
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import draw_noise, lag_range, reference_response
 from martths_jax.tune.objective import Objective
@@ -55,6 +55,7 @@ class Gradient:
         motions: list[Motion],
         noise: SensorNoise | None = None,
     ):
+        check_runtime()
         self.objective, self.plants = objective, plants
         fs = benchmark.fs
         trials = len(plants)
@@ -128,6 +129,7 @@ class Gradient:
 
     def __call__(self, logs) -> tuple[float, dict[str, float], dict[str, float], float]:
         """At log-numbers: objective, gradient, smooth indices, share of trials that diverged."""
+        check_runtime()
         logs = {name: jnp.asarray(value, dtype=float) for name, value in logs.items()}
         weights = self.objective.weights
         outcomes = [self.program(logs, weights, self.plants, *each) for each in self.inputs]

@@ -16,6 +16,7 @@ from martths_jax.plant import draw_plants
 from martths_jax.published import ADFC, LQG, TABLE4
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import simulate
+from martths_jax.study.files import write_text
 from martths_jax.tune.parameters import host_controller
 
 FRESH = 1_000_001  # first trial number of the fresh plants; tuning starts at 1
@@ -38,8 +39,7 @@ def write_report(
     """
     design = {name: 10.0**value for name, value in state["best"].items()}
     report = {"controller": controller, "ended": state["ended"] or "all steps done", **design}
-    with atomic(folder / "design.json") as part:
-        part.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    write_text(folder / "design.json", json.dumps(report, indent=1) + "\n")
     _write_csv(folder / "history.csv", state["history"])
     _plot(state["history"], folder / "convergence.png")
     rows = compare(benchmark, controller, state, check, plants)
@@ -75,7 +75,7 @@ def compare(benchmark, controller, state, check: Motion, plants: int) -> list[di
 
 
 def _write_csv(path: Path, rows: list[dict]) -> None:
-    with atomic(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+    with atomic(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)

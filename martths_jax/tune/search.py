@@ -16,7 +16,15 @@ from martths_jax.benchmark import VOLT_LIMIT, Benchmark
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import Motion
 from martths_jax.plant import draw_plants
+from martths_jax.runtime import check_runtime
 from martths_jax.sensors import SensorNoise
+from martths_jax.study.files import set_aside, write_text
+from martths_jax.study.header import sealed
+from martths_jax.study.machine import machine_identity
+from martths_jax.study.owner import Owner, owned
+from martths_jax.study.plan import motion_identity
+from martths_jax.study.provenance import differences, versions
+from martths_jax.study.sources import engine_code
 from martths_jax.tune.gradient import Gradient
 from martths_jax.tune.objective import Objective
 from martths_jax.tune.parameters import start_of
@@ -88,6 +96,7 @@ def tune(
     folder: Path,
     *,
     tell: Callable[[dict], None] = lambda row: None,
+    notice: Callable[[str], None] = lambda text: None,
     gradient: Gradient | None = None,
 ) -> dict:
     """Minimise the objective; keeps ``state.json`` in `folder` after each step and goes on from it.
@@ -96,6 +105,7 @@ def tune(
         motions: what to tune on.
         folder: where the state is kept; a folder with the state of other options is refused.
         tell: called with each row of the history.
+        notice: is told what was damaged and set aside.
         gradient: of the same plants and motions with other weights of the same indices, which
             saves compiling one.
 
@@ -103,14 +113,33 @@ def tune(
         the state: ``start``, ``best`` (log10 of the numbers), ``history`` (rows), ``ended``.
 
     Raises:
-        InputError: for options that cannot be used, or a start with which a trial diverges.
+        InputError: for options that cannot be used, a start with which a trial diverges, or a
+            folder that holds another tuning or in which one runs.
     """
+    check_runtime()
+    options.check()
+    with owned(folder, f"tune {options.controller}") as owner:
+        return _descend(benchmark, options, motions, owner, tell, notice, gradient)
+
+
+def setting_of(options: Options, motions: list[Motion]) -> dict:
+    """What decides the course of a tuning, as JSON can hold it."""
+    setting = {k: v for k, v in asdict(options).items() if k != "steps"} | {
+        "motions": [[m.name, motion_identity(m)] for m in motions],
+        "versions": versions(),
+        "code": engine_code(("tune/*.py",)),
+        "machine": machine_identity(),
+    }
+    return json.loads(json.dumps(setting))
+
+
+def _descend(benchmark, options, motions, owner: Owner, tell, notice, gradient) -> dict:
+    """The steps that are not done yet; see ``tune``."""
     objective, start = options.check()
-    setting = asdict(options) | {"motions": [[m.name, len(m.acceleration)] for m in motions]}
-    setting = json.loads(json.dumps({k: v for k, v in setting.items() if k != "steps"}))
+    folder, setting = owner.folder, setting_of(options, motions)
     free = options.free or tuple(start)
     optimiser = optax.adam(1.0)
-    state = _load(folder / STATE, setting)
+    state = _load(folder / STATE, setting, notice)
     if state is None:
         blank = optimiser.init({name: jnp.zeros(()) for name in free})
         state = {
@@ -147,7 +176,8 @@ def tune(
         if _stalled(state["history"], options.patience):
             state["ended"] = state["ended"] or "no more improvement"
         tell(state["history"][-1])
-        _save(folder / STATE, state)
+        owner.check()
+        write_text(folder / STATE, json.dumps(sealed(state), indent=1))
     return state
 
 
@@ -186,24 +216,25 @@ def _leaves(tree) -> list:
     return [np.asarray(x).tolist() for x in jax.tree.leaves(tree)]
 
 
-def _load(path: Path, setting: dict) -> dict | None:
+def _load(path: Path, setting: dict, notice) -> dict | None:
     if not path.exists():
         return None
     try:
-        state = json.loads(path.read_text())
-        same = state["setting"] == setting
-    except (json.JSONDecodeError, KeyError, TypeError):
-        raise InputError(f"{path} is not the state of a tuning; give another --out.") from None
-    if not same:
+        state = json.loads(path.read_text("utf-8"))
+        if state["sha256"] != sealed(state)["sha256"]:
+            raise ValueError("its checksum is another")
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror or error}).") from None
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        aside = set_aside(path)
+        notice(f"{path} is damaged ({error}); it was set aside as {aside.name}, and the tuning "
+               "begins again.")  # fmt: skip
+        return None
+    differing = differences(state["setting"], setting)
+    if differing:
+        listed = "\n".join(f"  {text}" for text in differing)
         raise InputError(
-            f"{path.parent} holds a tuning with other options; give another --out, or repeat the "
-            "options to go on with it."
+            f"{path.parent} holds a tuning with other options.  These differ:\n{listed}\n"
+            "Give another --out (`folder`), or repeat the options to go on with it."
         )
-    return state
-
-
-def _save(path: Path, state: dict) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    new = path.with_suffix(".new")
-    new.write_text(json.dumps(state, indent=1))
-    new.replace(path)
+    return {k: v for k, v in state.items() if k != "sha256"}

@@ -2,6 +2,8 @@
 
 import csv
 import json
+import os
+import signal
 import sys
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 from scipy.io import loadmat
 from typer.testing import CliRunner
 
-from martths_jax import published
+from martths_jax import cli, published
 from martths_jax.cli import app, main
 from martths_jax.files import atomic
 from martths_jax.nominal import Comparison, compare_with_table4
@@ -71,6 +73,29 @@ def test_run_saves_signals_indices_and_settings(motion_file, tmp_path):
     assert back["indices"] == by_name and back["about"]["settings"]["q"] == about["settings"]["q"]
 
 
+def test_a_trial_that_diverges_ends_the_run_with_a_sentence_and_exit_code_1(motion_file, tmp_path):
+    out = tmp_path / "out"
+    result = invoke(
+        "run", "--motion", motion_file, "--controller", "lqg", "--scale", 1000, "--out", out
+    )
+    assert result.exit_code == 1, result.output
+    told = " ".join(result.output.split())
+    assert "Diverged: lqg on burst: Trial 0 diverged: command u of actuator" in told
+    about = json.loads((out / "burst_lqg_run.json").read_text())
+    assert about["status"].startswith("Trial 0 diverged") and len(about["volt_peak"]) == 2
+    rows = csv.DictReader((out / "burst_lqg_indices.csv").open())
+    assert {row["value"] for row in rows} == {"nan"}
+
+
+def test_a_rate_at_which_the_controller_runs_away_is_refused(monkeypatch, capsys, tmp_path):
+    words = ["run", "--motion", "kobe-like", "--controller", "lqg", "--fs", "512"]
+    monkeypatch.setattr(sys, "argv", ["martths", *words, "--out", str(tmp_path / "x")])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 2
+    assert "lowest sampling rate that holds is" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -116,3 +141,20 @@ def test_comparison_averages_over_motions():
     each = {"adfc": {"a": dict.fromkeys(published.TABLE4, 1.0)}}
     table = Comparison(("a",), {"adfc": each["adfc"]["a"]}, each).to_markdown()
     assert "| J2_1 | 1.00 | 3.9 | -74.4 % |" in table
+
+
+def test_ctrl_c_twice_ends_at_once(monkeypatch):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    ended = []
+    monkeypatch.setattr(cli, "app", interrupted)
+    monkeypatch.setattr(os, "_exit", ended.append)
+    handler = signal.getsignal(signal.SIGINT)
+    try:
+        with pytest.raises(SystemExit) as first:
+            cli.main()
+        os.kill(os.getpid(), signal.SIGINT)
+        assert (first.value.code, ended) == (130, [130])
+    finally:
+        signal.signal(signal.SIGINT, handler)

@@ -276,7 +276,7 @@ def test_statuses(benchmark):
 
 def test_describing_a_result(benchmark):
     result = simulate(benchmark, Passthrough(), nominal_plant(), burst(0.3))
-    assert str(result) == "passthrough on burst: 1 trials at 1024 Hz, 307 samples; 1 ok"
+    assert str(result) == "passthrough on burst: 1 trial at 1024 Hz, 307 samples; 1 ok"
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ smooth, so that a test can work out what must be drawn.
 
 from __future__ import annotations
 
+import shutil
 from functools import cache
 from pathlib import Path
 
@@ -16,7 +17,7 @@ import xarray as xr
 from martths_jax import Motion
 from martths_jax.indices import DELAYS, NAMES
 from martths_jax.study import make_config
-from martths_jax.study.dataset import write_dataset
+from martths_jax.study.dataset import read_dataset, write_dataset
 from martths_jax.study.engine import Outcome
 from martths_jax.study.plan import build_plan
 from martths_jax.study.runner import header, write_results
@@ -29,7 +30,8 @@ TRIALS = 30
 #: A trial of LQG on the first motion that is stored as diverged.
 LOST = 7
 SAMPLES = 1500
-MOTIONS = ("elcentro-like", "short & <quick>")
+#: The second name would end a page's data, or its table of LaTeX, if it were taken for markup.
+MOTIONS = ("elcentro-like", "short & <!--<script><quick>")
 
 
 @cache
@@ -42,6 +44,7 @@ def build(parent: Path) -> Path:
     for i, (controller, motion) in enumerate(run.cells):
         run.write(controller, motion, trials, outcome(i))
     dataset = write_results(run)
+    run.close()
     path = run.path / "signals.nc"
     write_dataset(xr.Dataset(attrs={"format": FORMAT, "label": "-"}), path)
     for motion in MOTIONS:
@@ -104,6 +107,20 @@ def signals(roles: dict[int, str], controller: str) -> xr.Dataset:
     variables["role"] = ("kept", np.array(list(roles.values())))
     variables["trial"] = ("kept", np.array(list(roles), dtype=np.int32))
     return xr.Dataset(variables)
+
+
+def enlarge(folder: Path, out: Path, trials: int) -> Path:
+    """A study of more trials from the small one: its trials again and again, with other values."""
+    dataset = read_dataset(folder / "study.nc")
+    number = np.arange(trials + 1)
+    large = dataset.isel(trial=number % dataset.sizes["trial"])
+    large = large.assign_coords(trial=number.astype(np.int32))
+    large["value"] = large.value * xr.DataArray(1 + 1e-4 * number, dims="trial")
+    large.attrs["trials"] = trials
+    out.mkdir()
+    write_dataset(large, out / "study.nc")
+    shutil.copy(folder / "signals.nc", out / "signals.nc")
+    return out
 
 
 @pytest.fixture(scope="session")

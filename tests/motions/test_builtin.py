@@ -17,6 +17,7 @@ from martths_jax.motions.builtin import builtin_facts, builtin_record, fit_of, g
 from martths_jax.motions.builtin.facts import FACTS_FILE, FRACTIONS, PERIODS, to_plain
 from martths_jax.motions.builtin.matching import _hat_responses, _spectrum_misfit, match
 from martths_jax.motions.builtin.start import random_start
+from martths_jax.motions.builtin.store import cached
 
 from .places import need_records
 
@@ -87,10 +88,14 @@ def test_broken_cache_is_passed_over(tmp_path, monkeypatch):
     monkeypatch.setenv("MARTHS_CACHE", str(tmp_path))
     builtin_record.cache_clear()
     good = builtin_record("elcentro-like").acceleration
-    (kept,) = tmp_path.glob("*.npy")
+    (kept,) = tmp_path.glob("*.motion")
     kept.write_bytes(b"not an array")
     builtin_record.cache_clear()
-    np.testing.assert_array_equal(builtin_record("elcentro-like").acceleration, good)
+    again = builtin_record("elcentro-like")
+    np.testing.assert_array_equal(again.acceleration, good)
+    assert any("was damaged" in notice for notice in again.notices)
+    builtin_record.cache_clear()
+    assert builtin_record("elcentro-like").notices == ()
 
 
 def test_gradient_of_the_spectrum_is_its_derivative():
@@ -131,3 +136,44 @@ def test_senseless_ensembles_are_refused(tmp_path):
     (tmp_path / "short.csv").write_text("a [g]\n# dt = 0.01\n" + "\n".join("0 1 -1 0".split()))
     with pytest.raises(InputError, match="at least 4 s"):
         write_ensemble(str(tmp_path / "short.csv"), 1, tmp_path / "x")
+
+
+def test_a_flipped_bit_of_a_kept_motion_is_never_accepted(tmp_path, monkeypatch):
+    monkeypatch.setenv("MARTHS_CACHE", str(tmp_path))
+    facts = builtin_facts("elcentro")
+    good = builtin_record("elcentro-like").acceleration
+    made = []
+
+    def make():
+        made.append(1)
+        return good
+
+    cached("elcentro-like", facts, make)
+    (kept,) = tmp_path.glob("*.motion")
+    whole = kept.read_bytes()
+    assert cached("elcentro-like", facts, make)[1] == () and len(made) == 1
+    draw = np.random.default_rng(0)
+    for bit in draw.integers(0, 8 * len(whole), 60):
+        broken = bytearray(whole)
+        broken[bit // 8] ^= 1 << (bit % 8)
+        kept.write_bytes(broken)
+        values, notices = cached("elcentro-like", facts, make)
+        np.testing.assert_array_equal(values, good)
+        assert len(notices) == 1 and "was damaged" in notices[0]
+        assert kept.read_bytes() == whole  # put right, so that it is said once
+    assert len(made) == 61
+
+
+def test_another_motion_under_the_right_digest_is_not_accepted(tmp_path, monkeypatch):
+    monkeypatch.setenv("MARTHS_CACHE", str(tmp_path))
+    facts = builtin_facts("elcentro")
+    good = builtin_record("elcentro-like").acceleration
+    cached("elcentro-like", facts, lambda: 1.01 * good)  # a digest of its own bytes, and wrong
+    values, notices = cached("elcentro-like", facts, lambda: good)
+    np.testing.assert_array_equal(values, good)
+    assert notices
+    rounded = good + 1e-6 * (np.arange(good.size) % 7 == 0)  # what another machine may make
+    (kept,) = tmp_path.glob("*.motion")
+    kept.unlink()
+    cached("elcentro-like", facts, lambda: rounded)
+    assert cached("elcentro-like", facts, lambda: good)[1] == ()

@@ -8,6 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from martths_jax.cli import app as main_app
 from martths_jax.cli import motion_options as options
 from martths_jax.cli.motions import app
 from martths_jax.errors import InputError
@@ -71,6 +72,21 @@ def test_options_of_other_commands():
     assert np.abs(got[0].acceleration).max() == pytest.approx(0.2 * 9.80665, rel=0.03)
     result = runner.invoke(command, ["--motion", "elcentro-like", "--scale", "1", "--sa", "1g@2Hz"])
     assert isinstance(result.exception, InputError)
+
+
+def test_dt_and_variable_reach_every_command(tmp_path):
+    rows = "\n".join(f"{k % 7},{k % 5 - 2},{k % 3}" for k in range(40))
+    (tmp_path / "three.csv").write_text("NS [g],EW [g],UD [g]\n" + rows)
+    given = ["--records", str(tmp_path)]
+    result = runner.invoke(app, given)
+    assert "--variable" in " ".join(result.output.split())
+    result = runner.invoke(app, [*given, "--variable", "EW", "--dt", "0.02"])
+    assert result.exit_code == 0 and "2.000" in result.output, result.output
+    for name in ("study", "sweep", "sensitivity", "run", "table4", "tune", "motions"):
+        told = runner.invoke(main_app, [name, "--help"], env={"COLUMNS": "200"})
+        assert told.exit_code == 0
+        for option in ("--units", "--dt", "--variable"):
+            assert option in told.output, (name, option)
 
 
 def test_importing_motions_leaves_matplotlib_alone():

@@ -163,7 +163,7 @@ def test_unknown_missing_and_contradicting_units(tmp_path):
     check_refused([str(path), "does not say the unit", "--units"], path)
     check_refused(["units", "furlong", "g, m/s2, cm/s2"], path, units="furlong")
     path = at2(tmp_path)
-    check_refused([str(path), "its unit is g", "--units says m/s2"], path, units="m/s2")
+    check_refused([str(path), "its unit is g", "`units` (--units) says m/s2"], path, units="m/s2")
 
 
 def test_empty_things(tmp_path):
@@ -197,7 +197,7 @@ def test_ragged_and_wide_tables(tmp_path):
     path = table(tmp_path, rows(TIME, WAVE) + "\n1,2,3")
     check_refused([str(path), "line 401", "3 columns"], path, units="g")
     path = table(tmp_path, rows(TIME, WAVE, WAVE))
-    check_refused([str(path), "line 1", "3 columns", "remove"], path, units="g")
+    check_refused([str(path), "3 columns", "2, 3", "`variable` (--variable)"], path, units="g")
     path = table(tmp_path, rows(TIME, WAVE) + "\nend of file")
     check_refused([str(path), "line 401", "end of file"], path, units="g")
 

@@ -5,13 +5,14 @@ import os
 import socket
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from martths_jax import InputError
-from martths_jax.study import merge_runs, open_study, run_study
+from martths_jax.study import Reporter, merge_runs, open_study, run_study
 from martths_jax.study.distributed import join
 from martths_jax.study.runner import share_of
 from tests.study.places import ONE_BLOCK, result_bytes, short_motion, small
@@ -25,8 +26,9 @@ from martths_jax.study import provenance, run_study
 from martths_jax.study.distributed import join
 from tests.study.places import ONE_BLOCK, small
 provenance.git_commit = lambda: "0000000"
-share = join("localhost:{port}", 2, {number})
-done = run_study(small({folder!r}, trials=300, memory_gb=ONE_BLOCK), share=share, together=True)
+met = join("localhost:{port}", 2, {number})
+settings = small({folder!r}, trials=300, memory_gb=ONE_BLOCK)
+done = run_study(settings, share=met.share, together=met)
 assert (done is not None) == ({number} == 0)
 """
 
@@ -122,3 +124,60 @@ def test_a_process_alone_says_what_it_misses():
         pytest.skip("is about a machine without a cluster's variables")
     with pytest.raises(InputError, match="cannot be joined"):
         join(None, None, None)
+
+
+def attend(*processes):
+    """What joining comes to for each (port, processes, number), side by side; dies: how it ends."""
+
+    def one(port, count, number, timeout=30.0, dies=False):
+        try:
+            met = join(f"localhost:{port}", count, number, timeout)
+            if dies:  # what the system does for a process that ends
+                met.close()
+                return "died"
+            met.finish(Reporter())
+        except InputError as error:
+            return str(error)
+        return met.share
+
+    with ThreadPoolExecutor(len(processes)) as pool:
+        return list(pool.map(lambda p: one(*p), processes))
+
+
+def test_processes_meet_and_part():
+    port = free_port()
+    assert attend(*((port, 3, i) for i in range(3))) == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_a_wrong_coordinator_and_a_process_alone_end_in_words():
+    lost, alone = attend((1, 2, 1, 1.0), (free_port(), 2, 0, 1.0))
+    assert "nothing answered at localhost:1 within 1 s" in lost
+    assert "of 2 processes, number 1 did not come" in alone and "--join-timeout" in alone
+
+
+def test_a_doubled_process_ends_in_words():
+    port = free_port()
+    found = attend(*((port, 3, i) for i in (0, 1, 1)))
+    assert all("process 1 came twice" in text for text in found)
+
+
+def test_a_process_that_ends_early_is_named():
+    port = free_port()
+    first, died, last = attend((port, 3, 0), (port, 3, 1, 30.0, True), (port, 3, 2))
+    assert died == "died" and last == (3, 3)
+    assert "Process 1 (process" in first and "ended before its share was done" in first
+    port = free_port()
+    died, last = attend((port, 2, 0, 30.0, True), (port, 2, 1))
+    assert "Process 0 ended before it had written the results" in last
+
+
+def test_another_number_of_processes_is_said():
+    port = free_port()
+    found = attend((port, 2, 0), (port, 3, 1))
+    assert all("(--num-processes)" in text for text in found)
+
+
+@pytest.mark.parametrize("address", ["host", "host:", ":80", "host:x", "host:99999"])
+def test_an_address_is_host_and_port(address):
+    with pytest.raises(InputError, match="HOST:PORT"):
+        join(address, 2, 1)

@@ -69,7 +69,7 @@ def test_a_cell_is_what_simulate_gives(whole):
     )
     assert np.array_equal(cell.value.values, table(result))
     assert np.array_equal(cell.status.values, result.status)
-    assert np.array_equal(cell.volt_peak.values.T, result.watch.volt_peak)
+    assert np.array_equal(cell.volt_peak.values, result.watch.volt_peak)
     assert not np.array_equal(
         cell.value.values,
         whole.dataset.value.sel(

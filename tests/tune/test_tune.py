@@ -1,5 +1,6 @@
 """Gradients of whole runs, and the descent on a short motion."""
 
+import json
 from dataclasses import replace
 
 import jax
@@ -7,9 +8,19 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from martths_jax import ADFC, LQG, InputError, build_benchmark, draw_plants, load_motion, loop
+from martths_jax import (
+    ADFC,
+    LQG,
+    InputError,
+    Motion,
+    build_benchmark,
+    draw_plants,
+    load_motion,
+    loop,
+)
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import reference_response
+from martths_jax.study.owner import owned
 from martths_jax.tune import Options, tune
 from martths_jax.tune import gradient as gradients
 from martths_jax.tune import search as searching
@@ -87,6 +98,41 @@ def test_interrupted_tuning_goes_on_as_if_nothing_had_happened(bowl, tmp_path):
     assert parts["history"] == whole["history"]
     with pytest.raises(InputError, match="other options"):
         tune(None, replace(bowl, seed=2), [], tmp_path / "parts")
+
+
+@pytest.mark.parametrize("change", ["scale", "samples"])
+def test_a_tuning_goes_on_with_the_same_samples_only(bowl, tmp_path, change):
+    """The same name and length are not the same record."""
+    plain = Motion("one", np.arange(1.0, 9.0), 1024.0, scale=0.4)
+    double = replace(plain, acceleration=2 * plain.acceleration, scale=0.8)
+    other = double if change == "scale" else replace(plain, acceleration=plain.acceleration[::-1])
+    tune(None, replace(bowl, steps=3), [plain], tmp_path)
+    with pytest.raises(InputError, match="motions"):
+        tune(None, bowl, [other], tmp_path)
+
+
+def test_no_bit_of_a_state_changes_without_a_word(bowl, tmp_path):
+    whole = tune(None, replace(bowl, steps=5), [], tmp_path)
+    content = (tmp_path / "state.json").read_bytes()
+    for bit in range(5, 8 * len(content), 997):
+        changed = bytearray(content)
+        changed[bit // 8] ^= 1 << (bit % 8)
+        (tmp_path / "state.json").write_bytes(changed)
+        said = []
+        try:
+            again = tune(None, replace(bowl, steps=5), [], tmp_path, notice=said.append)
+        except InputError as error:  # a letter of an option, say
+            assert "state.json" in str(error)
+            continue
+        assert again["history"] == whole["history"] and again["best"] == whole["best"]
+        assert any("damaged" in text for text in said) or json.loads(changed) == json.loads(content)
+        for aside in tmp_path.glob("*.damaged*"):
+            aside.unlink()
+
+
+def test_two_tunings_do_not_share_a_folder(bowl, tmp_path):
+    with owned(tmp_path, "martths tune"), pytest.raises(InputError, match="in use"):
+        tune(None, bowl, [], tmp_path)
 
 
 def test_unstable_steps_are_backed_off(bowl, tmp_path, monkeypatch):

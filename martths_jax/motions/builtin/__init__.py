@@ -66,14 +66,14 @@ def builtin_record(name: str) -> Record:
     """The unscaled built-in motion of that name."""
     facts = builtin_facts(name)
     seed = stored_seeds()[BUILTIN_NAMES[name]]
-    samples = cached(name, facts.samples, lambda: generate(facts, seed))
+    samples, notices = cached(name, facts, lambda: generate(facts, seed))
     samples.setflags(write=False)
-    return _record(name, samples, facts.dt)
+    return _record(name, samples, facts.dt, notices)
 
 
-def _record(name: str, samples: np.ndarray, dt: float) -> Record:
+def _record(name: str, samples: np.ndarray, dt: float, notices: tuple[str, ...] = ()) -> Record:
     checksum = hashlib.sha256(np.ascontiguousarray(samples, dtype="<f8").tobytes()).hexdigest()
-    return Record(name, samples, dt, source="built-in", sha256=checksum)
+    return Record(name, samples, dt, source="built-in", sha256=checksum, notices=notices)
 
 
 def ensemble(

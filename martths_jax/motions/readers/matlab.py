@@ -1,23 +1,33 @@
-"""MATLAB files, version 5 (SciPy) and 7.3 (HDF5, h5py)."""
+"""The motion in a MATLAB file: which array it is, its time and its unit."""
 
 from __future__ import annotations
 
-import io
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import InputError
-from ..checks import check_memory, uniform_step
+from ..timeaxis import uniform_step
+from ..units import is_unit, looks_like_unit, parse_unit
+from .arrays import from_array, is_table, is_vector
+from .columns import pick, several, time_column
 from .contents import Contents
+from .mat_files import Variables, is_hdf5, read_variables
 
 #: Arrays of the benchmark's companion package: in m/s^2, though their files do not say so.
 BENCHMARK_ARRAYS = ("ElCentroAccel", "KobeAccel", "MorganAccel")
 
-_TIME_NAMES = re.compile(r"(^|\.)(t|time|tt|time_s|times)$", re.IGNORECASE)
+_TIME_NAMES = re.compile(r"(^|\.)(t|time|tt|time_s|times|tout)$", re.IGNORECASE)
 _STEP_NAMES = re.compile(r"(^|\.)(dt|delta_?t|time_?step|step)$", re.IGNORECASE)
-_HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+_UNIT_NAMES = re.compile(r"(^|\.)(units?|unit_?acc\w*)$", re.IGNORECASE)
+_SIGNALS = re.compile(r"\.signals(\(\d+\))?$")
+
+
+def is_matlab(content: bytes) -> bool:
+    """Whether a file says that it is MATLAB's (version 5) or HDF5 (version 7.3)."""
+    return content[:10] == b"MATLAB 5.0" or is_hdf5(content)
 
 
 def read_matlab(path: Path, content: bytes, *, variable=None, dt=None) -> Contents:
@@ -25,46 +35,75 @@ def read_matlab(path: Path, content: bytes, *, variable=None, dt=None) -> Conten
 
     Accepted: an array 2 x N or N x 2 (time [s], acceleration); a vector with a time vector
     (``t``, ``time``) or a step (``dt``) beside it, or with the time step given; the same inside a
-    struct.  With several candidates `variable` must pick one.
+    struct, and Simulink's structure with time (``time`` beside ``signals.values``).  With several
+    candidates `variable` must pick one, and ``array:3`` its third column.
     """
-    arrays = _read_arrays(path, content)
-    tables = {k: a for k, a in arrays.items() if _is_table(a)}
-    vectors = {k: a for k, a in arrays.items() if _is_vector(a) and not _TIME_NAMES.search(k)}
-    name = _choose(path, arrays, tables or vectors, variable)
+    held = read_variables(path, content)
+    arrays = held.arrays
+    variable, _, column = (variable or "").partition(":")
+    tables = {k: a for k, a in arrays.items() if _is_timed(a)}
+    vectors = {k: a for k, a in arrays.items() if is_vector(a) and not _TIME_NAMES.search(k)}
+    name = _choose(path, held, tables or vectors, variable or None)
     where = f"File {path}, array `{name}`"
     array = arrays[name]
     if array.size == 0:
-        raise InputError(f"{where} is empty; pick another array (--variable) or file.")
-    unit = "m/s2" if name in BENCHMARK_ARRAYS else None
-    if _is_table(array):
-        time, values = array if array.shape[0] == 2 else array.T
-        if np.any(np.diff(time) <= 0) and np.all(np.diff(values) > 0):
-            time, values = values, time
-        return Contents(values, uniform_step(time, where), unit, where)
-    if not _is_vector(array):
+        raise InputError(
+            f"{where} is empty; pick another array in `variable` (--variable) or another file."
+        )
+    if not (is_vector(array) or (array.ndim == 2 and min(array.shape) > 1)):
         raise InputError(
             f"{where} has the shape {' x '.join(map(str, array.shape))}, but 2 x N, N x 2 (time, "
-            "acceleration) or a vector is wanted; pick another array with --variable."
+            "acceleration) or a vector is wanted; pick another array in `variable` (--variable)."
         )
-    values = array.ravel()
-    return Contents(values, _step_beside(arrays, name, values.size, where), unit, where)
+    beside = _step_beside(arrays, name, max(array.shape), where, dt)
+    upright = array if array.shape[0] >= array.shape[1] else array.T
+    if beside is not None and not is_vector(array) and time_column(upright) is None:
+        names = [""] * upright.shape[1]
+        if not column:
+            raise several(where, names, list(range(len(names))))
+        values = upright[:, pick(column, names, where)]
+        found = Contents(values, None, None, where)
+    else:
+        found = from_array(array, where, variable=column or None, dt=dt)
+    if found.dt is None and beside is not None:
+        found = replace(found, dt=beside[0], notices=beside[1])
+    return replace(found, unit=_unit(path, held, name))
 
 
-def _is_table(array: np.ndarray) -> bool:
-    return array.ndim == 2 and 2 in array.shape and min(array.shape) > 1
+def _is_timed(array: np.ndarray) -> bool:
+    """Whether an array could hold a time and an acceleration: 2 x N, N x 2, or more columns."""
+    if is_table(array):
+        return True
+    if array.ndim != 2 or not 2 < min(array.shape) <= 12 or array.shape[0] == array.shape[1]:
+        return False
+    return time_column(array.T if array.shape[0] < array.shape[1] else array) is not None
 
 
-def _is_vector(array: np.ndarray) -> bool:
-    return array.size > 1 and array.size == max(array.shape)
+def _unit(path: Path, held: Variables, name: str) -> str | None:
+    """The unit in a text called ``units`` beside the array; the benchmark's arrays are known."""
+    if name in BENCHMARK_ARRAYS:
+        return "m/s2"
+    folder = name.rpartition(".")[0]
+    for other, text in held.texts.items():
+        if _UNIT_NAMES.search(other) and other.rpartition(".")[0] == folder:
+            if is_unit(text) or looks_like_unit(text):
+                return parse_unit(text, f"File {path}, `{other}`")
+    return None
 
 
-def _choose(path: Path, arrays: dict, candidates: dict, variable: str | None) -> str:
+def _choose(path: Path, held: Variables, candidates: dict, variable: str | None) -> str:
+    arrays = held.arrays
     listed = ", ".join(
         f"{name} ({' x '.join(map(str, array.shape))})" for name, array in list(arrays.items())[:12]
     )
+    if variable is not None and variable in arrays:
+        return variable
+    if held.objects and (variable is not None or not candidates):
+        raise InputError(
+            f"File {path} holds {', '.join(held.objects[:6])}, which only MATLAB can open; "
+            "save its numbers there: t = ts.Time; acc = ts.Data; save('record.mat', 't', 'acc')."
+        )
     if variable is not None:
-        if variable in arrays:
-            return variable
         raise InputError(
             f"File {path} has no numeric array `{variable}`; it holds {listed or 'none'}."
         )
@@ -80,95 +119,27 @@ def _choose(path: Path, arrays: dict, candidates: dict, variable: str | None) ->
         )
     raise InputError(
         f"File {path} has {len(candidates)} arrays that could be the motion: "
-        f"{', '.join(list(candidates)[:12])}; pick one with --variable."
+        f"{', '.join(list(candidates)[:12])}; pick one in `variable` (--variable)."
     )
 
 
-def _step_beside(arrays: dict, name: str, size: int, where: str) -> float | None:
-    """Time step from a time vector or a step stored next to the acceleration vector."""
+def _step_beside(arrays: dict, name: str, size: int, where: str, dt: float | None):
+    """Time step and notices from a time vector or a step stored next to the acceleration.
+
+    Simulink keeps the time one level above ``signals.values``.
+    """
     folder = name.rpartition(".")[0]
+    folders = [folder]
+    if _SIGNALS.search(folder):
+        folders.append(folder.rpartition(".")[0])
     for other, array in arrays.items():
-        if other == name or other.rpartition(".")[0] != folder:
+        if other == name or other.rpartition(".")[0] not in folders:
             continue
         if _TIME_NAMES.search(other) and array.size == size:
-            return uniform_step(array.ravel(), where)
+            return uniform_step(array.ravel(), where, None, dt)
         if _STEP_NAMES.search(other) and array.size == 1:
             step = float(array.ravel()[0])
             if not (np.isfinite(step) and step > 0):
                 raise InputError(f"{where}: its time step `{other}` is {step}, not positive.")
-            return step
+            return step, ()
     return None
-
-
-def _read_arrays(path: Path, content: bytes) -> dict[str, np.ndarray]:
-    """Every real numeric array of the file by its (dotted) name, as float64."""
-    try:
-        if content[:8] == _HDF5_MAGIC or content[512:520] == _HDF5_MAGIC:
-            return _read_hdf5(path, content)
-        return _read_version5(path, content)
-    except InputError:
-        raise
-    except MemoryError:
-        raise InputError(f"File {path} holds an array that does not fit in memory.") from None
-    except Exception as error:  # damaged files make SciPy and h5py raise nearly anything
-        reason = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
-        raise InputError(
-            f"File {path} cannot be read as a MATLAB file ({reason}); save it again from MATLAB, "
-            "or export it as CSV."
-        ) from None
-
-
-def _as_numbers(value: object) -> np.ndarray | None:
-    array = np.asarray(value)
-    if array.dtype.kind not in "fiu" or array.ndim > 2:
-        return None
-    return array.astype(np.float64)
-
-
-def _read_version5(path: Path, content: bytes) -> dict[str, np.ndarray]:
-    from scipy.io import loadmat, whosmat
-
-    for name, shape, _ in whosmat(io.BytesIO(content)):
-        check_memory(np.prod(np.asarray(shape, dtype=np.float64)), f"File {path}, array `{name}`")
-    loaded = loadmat(io.BytesIO(content), struct_as_record=False, squeeze_me=False)
-    arrays: dict[str, np.ndarray] = {}
-
-    def collect(name: str, value: object, depth: int = 0) -> None:
-        if depth > 4:
-            return
-        if isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:
-            value = value.ravel()[0]
-        if hasattr(value, "_fieldnames"):
-            for field in value._fieldnames:
-                collect(f"{name}.{field}", getattr(value, field), depth + 1)
-        elif (numbers := _as_numbers(value)) is not None:
-            arrays[name] = numbers
-
-    for name, value in loaded.items():
-        if not name.startswith("__"):
-            collect(name, value)
-    return arrays
-
-
-def _read_hdf5(path: Path, content: bytes) -> dict[str, np.ndarray]:
-    import h5py
-
-    arrays: dict[str, np.ndarray] = {}
-    with h5py.File(io.BytesIO(content), "r") as file:
-
-        def collect(name: str, item: object) -> None:
-            if not isinstance(item, h5py.Dataset) or name.startswith("#"):
-                return
-            if item.dtype.kind not in "fiu" or item.ndim > 2:
-                return
-            if item.attrs.get("MATLAB_class", b"double") in (b"char", b"cell", b"logical"):
-                return
-            dotted = name.replace("/", ".")
-            if item.attrs.get("MATLAB_empty", 0):
-                arrays[dotted] = np.empty((0, 0))
-                return
-            check_memory(float(item.size), f"File {path}, array `{dotted}`")
-            arrays[dotted] = np.asarray(item[()], dtype=np.float64)
-
-        file.visititems(collect)
-    return arrays

@@ -1,109 +1,232 @@
-"""CSV and other plain tables: acceleration alone, or time and acceleration."""
+"""CSV and other plain tables: acceleration alone, with its time, or among other columns."""
 
 from __future__ import annotations
 
-import re
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import InputError
-from ..checks import uniform_step
-from ..units import is_unit, parse_unit
+from ..timeaxis import uniform_step
+from ..units import is_unit, looks_like_unit, time_unit
+from .columns import lies_in_rows, pick, runs_on, several, time_column
 from .contents import Contents
-from .text import NUMBER, numbers_of, text_lines, to_float
+from .dialect import Table, read_dialect, split_line
+from .grammar import (
+    Cell,
+    Said,
+    agreed_unit,
+    column_cells,
+    is_acceleration,
+    other_quantity,
+    says_value,
+    surely_acceleration,
+    units_row,
+    units_said,
+)
+from .leading import without_counts
+from .steps import header_count, header_step
+from .text import text_lines
 
-_BRACKETS = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
-_STEP = re.compile(rf"\bdt\s*(?:\[s\]|\(s\))?\s*[=:]\s*({NUMBER.pattern})", re.IGNORECASE)
-_TIMELIKE = re.compile(r"^\s*#?\s*\"?\s*(t|time)\b", re.IGNORECASE)
-_HEADER_LINES = 20
+
+@dataclass(frozen=True)
+class Titles:
+    """Titles of the columns, empty where the header has none, and the lines they stand in."""
+
+    cells: tuple[Cell, ...] = ()
+    lines: tuple[int, ...] = ()
+
+    def names(self, columns: int) -> list[str]:
+        """A name for each column, empty where it has none."""
+        return [cell.name for cell in self.cells] if self.cells else [""] * columns
 
 
 def read_table(path: Path, content: bytes, *, variable=None, dt=None) -> Contents:
-    """Acceleration of a text table with one or two columns and an optional header.
+    """Acceleration of a text table (``docs/motions.md`` says what is read and what refused).
 
-    Columns are separated by commas, semicolons, tabs or spaces.  Lines before the first numbers
-    (20 at most) and lines that start with ``#`` are the header; a unit there stands in brackets
-    after the column's name (``acceleration [g]``), a time step as ``dt = 0.005``.
+    Columns are separated by commas, semicolons, tabs or blanks.  `variable` picks a column by its
+    title or its number; `dt` [s] is the step where the file has none.
     """
-    header, rows, places = _split(path, text_lines(path, content))
-    if not rows:
+    table = read_dialect(path, text_lines(path, content))
+    table, count, step, notices = without_counts(path, table, dt)
+    said_step = header_step(path, table.header)
+    said_count = header_count(path, table.header)
+    step = said_step if said_step is not None else step
+    count = said_count[0] if said_count else count
+    titles = _titles(table)
+    found = _series(path, table, titles, variable, dt if dt is not None else step, count)
+    if count is not None and found.values.size != count:
+        place = f"line {said_count[1]}" if said_count else "line 1"
         raise InputError(
-            f"File {path} holds no numbers, but one column (acceleration) or two (time, "
-            "acceleration) are wanted; check that this is the right file."
+            f"File {path}, {place}: the header says that there are {count} samples, but "
+            f"{found.values.size} values follow; the file is truncated, or correct the header."
         )
-    where = f"File {path}"
-    columns = len(rows[0])
-    for row, place in zip(rows, places, strict=True):
-        if len(row) != columns or columns > 2:
-            wanted = "1 or 2" if columns > 2 else f"{columns} as in line {places[0]}"
-            raise InputError(
-                f"File {path}, line {place}: found {len(row)} columns, but {wanted} are wanted "
-                "(acceleration, or time and acceleration); remove the others."
-            )
-    data = np.array(rows)
-    unit = _unit(path, header)
-    if columns == 1:
-        return Contents(data[:, 0], _step(path, header), unit, where, places)
-    if len(rows) < 2:
-        raise InputError(f"{where} holds one row of numbers, but a motion needs at least 2.")
-    return Contents(data[:, 1], uniform_step(data[:, 0], where, places), unit, where, places)
+    if found.dt is not None and step is not None and abs(found.dt / step - 1) > 1e-3:
+        raise InputError(
+            f"File {path} has times at a step of {found.dt:.6g} s, but its header states the time "
+            f"step {step:.6g} s; correct one of them."
+        )
+    return replace(
+        found,
+        dt=step if found.dt is None else found.dt,
+        notices=(*notices, *found.notices),
+    )
 
 
-def _split(path: Path, lines: list[str]):
-    """Header lines with their numbers, rows of numbers, and the rows' line numbers."""
-    header: list[tuple[int, str]] = []
-    rows: list[list[float]] = []
-    places: list[int] = []
-    for number, line in enumerate(lines, 1):
-        stripped = line.strip()
-        if not stripped:
+def _titles(table: Table) -> Titles:
+    """The last line before the rows that has a title for each column, with a row of units."""
+    columns = len(table.rows[0])
+    units: tuple[tuple[str, ...], int] | None = None
+    for number, line in reversed(table.header[: table.before]):
+        cells = column_cells(line, split_line(line, table.separator), columns)
+        if not cells or says_value(line):
             continue
-        if stripped.startswith(("#", "%")):
-            header.append((number, stripped))
-            continue
-        row = _row(stripped)
-        if row is not None:
-            rows.append(row)
-            places.append(number)
-        elif not rows and len(header) < _HEADER_LINES:
-            header.append((number, stripped))
+        if units is None and (row := units_row(cells)):
+            units = (row, number)
+        elif units:
+            both = tuple(Cell(n.name, unit) for n, unit in zip(cells, units[0], strict=True))
+            return Titles(both, (number, units[1]))
         else:
-            raise InputError(
-                f"File {path}, line {number}: found {stripped[:40]!r}, but only numbers may follow "
-                "the header; correct or remove the line."
-            )
-    return header, rows, places
+            return Titles(cells, (number,))
+    if units is None:
+        return Titles()
+    # One letter without a title above it is a direction (V, H), but for that of g.
+    cells = tuple(Cell("", u) if len(u) > 1 or u in "gGsS" else Cell(u, None) for u in units[0])
+    return Titles(cells, (units[1],))
 
 
-def _row(line: str) -> list[float] | None:
-    """Numbers of a line; an empty field between two separators counts as not a number."""
-    if re.search(r"[,;]\s*[,;]", line):
+def _series(path, table: Table, titles: Titles, variable, dt, count) -> Contents:
+    """The acceleration, its unit and its step, from the shape of the table."""
+    where = f"File {path}"
+    columns = len(table.rows[0])
+    odd = [k for k, row in enumerate(table.rows) if len(row) != columns]
+    if columns == 1 and not odd:
+        values = np.array(table.rows)[:, 0]
+        unit, notices = _unit(path, table, titles, 0 if titles.cells else None)
+        return Contents(values, None, unit, where, table.places, notices)
+    if odd or len(table.rows) == 1:
+        return _running(path, table, titles, odd, variable)
+    matrix = np.array(table.rows)
+    if not titles.cells and lies_in_rows(matrix):
+        matrix, table = matrix.T, replace(table, places=[])
+    time = _time(matrix, titles, dt)
+    choice = _column(matrix, titles, time, variable, where, count)
+    if choice is None:
+        return _running(path, table, titles, [], variable, certain=count == matrix.size)
+    unit, notices = _unit(path, table, titles, choice)
+    lines = table.places or None
+    if time is None:
+        return Contents(matrix[:, choice], None, unit, where, lines, notices)
+    factor = _time_factor(where, titles, time)
+    step, more = uniform_step(matrix[:, time], where, lines, dt / factor if dt else None)
+    return Contents(matrix[:, choice], step * factor, unit, where, lines, (*notices, *more))
+
+
+def _time(matrix: np.ndarray, titles: Titles, dt: float | None) -> int | None:
+    """Index of the time's column: by its title, else by its numbers.
+
+    A column that counts rows is no time.  Where nothing says seconds, steps of exactly 1 count
+    rows if the step is known otherwise.
+    """
+    for k, cell in enumerate(titles.cells):
+        if cell.is_time:
+            return k
+    k = time_column(matrix)
+    if k is None or (titles.cells and titles.cells[k].is_counter):
         return None
-    values = numbers_of(line)
-    return values or None
+    if dt is not None and dt != 1 and np.all(np.diff(matrix[:, k]) == 1):
+        return None
+    if titles.cells and (titles.cells[k].is_other or is_acceleration(titles.cells[k])):
+        return None
+    return k
 
 
-def _unit(path: Path, header: list[tuple[int, str]]) -> str | None:
-    """The unit in brackets after the name of the last column that is not time."""
-    for number, line in reversed(header):
-        for part in reversed(re.split(r"[,;\t]", line)):
-            match = _BRACKETS.search(part)
-            if match is None or _TIMELIKE.match(part) or _STEP.search(part):
-                continue
-            if is_unit(match[1]) or "/" in match[1]:  # other brackets are part of a title
-                return parse_unit(match[1], f"File {path}, line {number},")
-    return None
+def _column(matrix, titles: Titles, time, variable, where, count) -> int | None:
+    """Index of the acceleration's column; None where the rows are one running series."""
+    columns = matrix.shape[1]
+    names = titles.names(columns)
+    if variable is not None:
+        choice = pick(variable, names, where)
+        if choice == time:
+            raise InputError(
+                f"{where}: column {choice + 1}, which `variable` (--variable) picks, is the time; "
+                "pick an acceleration."
+            )
+        return choice
+    counter = [k for k in range(columns) if _counts_rows(matrix[:, k]) and k != time]
+    left = [k for k in range(columns) if k != time and k not in counter[:1]]
+    wanted = [k for k in left if not (titles.cells and titles.cells[k].is_other)]
+    if titles.cells and not wanted and len(left) == 1:
+        return left[0]  # `_unit` says that it is no acceleration
+    if len(wanted) == 1:
+        return wanted[0]
+    if time is None and not counter and not titles.cells and count != matrix.shape[0]:
+        if count == matrix.size or runs_on(matrix):
+            return None
+    raise several(where, names, wanted or left)
 
 
-def _step(path: Path, header: list[tuple[int, str]]) -> float | None:
-    for number, line in header:
-        if match := _STEP.search(line):
-            step = to_float(match[1])
-            if not (np.isfinite(step) and step > 0):
-                raise InputError(
-                    f"File {path}, line {number}: found dt = {match[1][:40]}, but a positive time "
-                    "step [s] is wanted; correct it."
-                )
-            return step
-    return None
+def _counts_rows(values: np.ndarray) -> bool:
+    return values.size > 2 and values[0] in (0, 1) and bool(np.all(np.diff(values) == 1))
+
+
+def _running(path, table: Table, titles, odd: list[int], variable, certain=True) -> Contents:
+    """One series over rows of several values, of which the last may be shorter."""
+    columns = len(table.rows[0])
+    where = f"File {path}"
+    whole = np.array(table.rows[: odd[0] if odd else None])
+    short = odd == [len(table.rows) - 1] and len(table.rows[-1]) < columns
+    timed = whole.shape[0] > 1 and time_column(whole) is not None
+    if odd and (not short or timed or titles.cells):
+        raise InputError(
+            f"File {path}, line {table.places[odd[0]]}: found {len(table.rows[odd[0]])} columns, "
+            f"but {columns} as in line {table.places[0]} are wanted; correct the line."
+        )
+    if len(table.rows) == 1 and columns < 3:
+        raise InputError(f"{where} holds one row of numbers, but a motion needs at least 2.")
+    if variable is not None:
+        raise InputError(
+            f"{where} was asked for column {variable!r:.60} (`variable`, --variable), but its rows "
+            f"of {columns} values are one series; leave it out."
+        )
+    unit, notices = _unit(path, table, titles, None)
+    values = np.array([value for row in table.rows for value in row])
+    places = [p for p, row in zip(table.places, table.rows, strict=True) for _ in row]
+    if not (certain or odd or len(table.rows) == 1):
+        notices = (
+            *notices,
+            f"{where}: its {columns} columns were read row by row as one series, which runs on "
+            "from line to line; give `variable` (--variable) to read one column.",
+        )
+    return Contents(values, None, unit, where, places, notices)
+
+
+def _unit(path, table: Table, titles: Titles, choice: int | None):
+    """The unit of the chosen column, and notices; refuses what is no acceleration."""
+    cell = titles.cells[choice] if titles.cells and choice is not None else Cell("", None)
+    own: list[Said] = []
+    line = titles.lines[-1] if titles.lines else 0
+    single = len(titles.cells) == 1
+    if cell.is_other and not (cell.unit is None and single):
+        if cell.unit is None or time_unit(cell.unit) is not None:
+            raise other_quantity(path, line, cell.name or "time")
+        own = [Said(cell.unit, line)]
+    elif cell.unit is not None:
+        text = dict(table.header).get(line, "")
+        own = [Said(cell.unit, line, not single or surely_acceleration(cell.name, text))]
+    free = [(n, text) for n, text in table.header if n not in titles.lines or (single and not own)]
+    return agreed_unit(path, own + units_said(path, free))
+
+
+def _time_factor(where: str, titles: Titles, time: int) -> float:
+    """Seconds in the unit of the time's column."""
+    unit = titles.cells[time].unit if titles.cells else None
+    factor = time_unit(unit) if unit else 1.0
+    if factor is None and (looks_like_unit(unit) or is_unit(unit)):
+        raise InputError(
+            f"{where}, line {titles.lines[-1]}: found the time in {unit!r:.30}, but s, ms or min "
+            "are wanted; correct the title, or give the step in `dt` (--dt) and the acceleration "
+            "alone."
+        )
+    return 1.0 if factor is None else factor

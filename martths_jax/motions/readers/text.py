@@ -9,20 +9,24 @@ from ...errors import InputError
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?"
 NUMBER = re.compile(_NUMBER)
-_NOT_FINITE = re.compile(r"[+-]?(?:nan|inf(?:inity)?)\b", re.IGNORECASE)
+_NOT_FINITE = r"[+-]?(?:nan|inf(?:inity)?)\b"
+_ITEM = re.compile(rf"{_NOT_FINITE}|{_NUMBER}", re.IGNORECASE)
 
 
 def text_lines(path: Path, content: bytes) -> list[str]:
-    """Lines of a text file; `InputError` when it is no text."""
+    """Lines of a text file in UTF-8, UTF-16 or cp1252; `InputError` when it is no text."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = content.decode("utf-16", errors="replace")
-    elif b"\x00" in content[:4096]:
+    elif b"\x00" in content:
         raise InputError(
             f"File {path} is not a text file (it holds zero bytes); check its ending, or export "
             "the record as text."
         )
     else:
-        text = content.decode("utf-8-sig", errors="replace")
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:  # what spreadsheets on Windows write
+            text = content.decode("cp1252", errors="replace")
     return re.split(r"\r\n|\r|\n", text)
 
 
@@ -32,14 +36,28 @@ def to_float(text: str) -> float:
 
 
 def numbers_of(line: str) -> list[float] | None:
-    """The numbers of a line (also run together: ``0.1E-3-0.2E-3``), None if it holds more."""
-    spread = _NOT_FINITE.sub(lambda m: f" {m[0]} ", line)
+    """The numbers of a line, None if it holds more.
+
+    Numbers may touch as Fortran prints them (``0.1E-3-0.2E-3``): where the second has a sign and
+    both have a decimal point.  ``1.2.3``, a date or ``0.1-104`` (a lost E) is no row of numbers.
+    """
     values: list[float] = []
-    rest = spread
-    while rest := rest.lstrip(" \t,;"):
-        match = _NOT_FINITE.match(rest) or NUMBER.match(rest)
-        if match is None:
+    end, before = 0, ""
+    for match in _ITEM.finditer(line):
+        start, item = match.start(), match[0]
+        if start > end:
+            if line[end:start].strip(" \t,;"):
+                return None
+        elif values and not (item[0] in "+-" and "." in item and "." in before):
             return None
-        values.append(to_float(match[0]))
-        rest = rest[match.end() :]
-    return values
+        values.append(to_float(item))
+        end, before = match.end(), item
+    return None if line[end:].strip(" \t,;") else values
+
+
+def fixed_numbers(line: str, width: int) -> list[float] | None:
+    """The numbers of a line in columns of `width` characters, None if it holds more."""
+    fields = [line[k : k + width].strip() for k in range(0, len(line.rstrip()), width)]
+    if not all(NUMBER.fullmatch(field) for field in fields):
+        return None
+    return [to_float(field) for field in fields]
