@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import json
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +11,7 @@ import typer
 from rich.markup import escape
 
 from martths_jax import published
-from martths_jax.benchmark import build_benchmark
+from martths_jax.benchmark import Benchmark, build_benchmark
 from martths_jax.cli.console import console, error_console, progress
 from martths_jax.cli.motion_options import (
     Dt,
@@ -27,9 +25,9 @@ from martths_jax.cli.motion_options import (
     Variable,
     load_all,
 )
-from martths_jax.controllers import ADFC, LQG, Passthrough
+from martths_jax.controllers import Controller
 from martths_jax.errors import argument_error
-from martths_jax.files import atomic
+from martths_jax.files import atomic, safe_name
 from martths_jax.indices import indices
 from martths_jax.motions import available_motions
 from martths_jax.nominal import Comparison, compare_with_table4
@@ -39,6 +37,8 @@ from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import simulate
 from martths_jax.structure.frame import build_reference
 from martths_jax.structure.frame import modes as natural_modes
+from martths_jax.study import make_config, plan
+from martths_jax.study.export import save_mat
 
 #: The paper's records as a folder of theirs names them, and the built-in motions that stand in.
 REAL = ("elcentro", "kobe", "morganhill")
@@ -48,21 +48,10 @@ Fs = Annotated[float, typer.Option("--fs", help="Sampling rate [Hz].")]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of the plant and noise draws.")]
 
 
-class ControllerName(StrEnum):
-    """Controllers that the command line can run."""
-
-    lqg = "lqg"
-    adfc = "adfc"
-    passthrough = "passthrough"
-
-
-def build_controller(name: str, benchmark):
-    """Controller of a name with its documented defaults."""
-    return {
-        "lqg": lambda: LQG.design(benchmark),
-        "adfc": ADFC,
-        "passthrough": Passthrough,
-    }[name]()
+def build_controller(given: str, benchmark: Benchmark) -> tuple[Controller, dict]:
+    """Controller of ``[NAME=]KIND[{KEY=VALUE,...}]`` and its settings."""
+    config = make_config(controllers=[given])
+    return plan.build_controller(config.controllers[0], config, benchmark)
 
 
 def default_motions(records: Path | None) -> list[str]:
@@ -93,8 +82,13 @@ def run(
     motion: Motions,
     out: Annotated[Path, typer.Option("--out", help="Folder for signals.npz and indices.")],
     controller: Annotated[
-        ControllerName, typer.Option("--controller", help="What drives the actuators.")
-    ] = ControllerName.adfc,
+        str,
+        typer.Option(
+            "--controller",
+            metavar="[NAME=]KIND[{KEY=VALUE,...}]",
+            help="lqg, adfc or passthrough, also with settings: 'adfc{nb=2048,no=2047}'.",
+        ),
+    ] = "adfc",
     trial: Annotated[
         int,
         typer.Option("--trial", min=0, help="0 is the nominal plant, 1, 2, ... uncertain ones."),
@@ -110,22 +104,27 @@ def run(
     dt: Dt = None,
     variable: Variable = None,
     resample: Resample = "linear",
+    mat: Annotated[
+        bool, typer.Option("--mat", help="Write all of it as a MATLAB file NAME.mat too.")
+    ] = False,
 ) -> None:
     """Run one trial and save its signals and indices.
 
     Writes, for each motion, NAME_signals.npz (time histories; strokes and commands in mm, motion in
-    m and rad, force in N and N m), NAME_indices.csv and NAME_run.json (status and settings).  A
-    trial that diverges has no indices: its files are written all the same, and the exit code is 1.
+    m and rad, force in N and N m), NAME_indices.csv and NAME_run.json (status and settings).  In
+    NAME.mat the signals are variables, indices and settings the structs indices and about.  A trial
+    that diverges has no indices: its files are written all the same, and the exit code is 1.
     """
     motions = load_all(motion, records, scale, pga, sa, units, resample, fs, dt, variable)
     benchmark = build_benchmark(fs, integrator)
-    drive = build_controller(controller, benchmark)
+    drive, chosen = build_controller(controller, benchmark)
     plants = nominal_plant() if trial == 0 else draw_plants(1, seed, first=trial)
+    about = {"trial": trial, "seed": seed, "integrator": integrator, "settings": chosen}
     lost = []
-    with progress(f"{controller.value}, trial {trial}", len(motions)) as tell:
+    with progress(f"{drive.name}, trial {trial}", len(motions)) as tell:
         for done, one in enumerate(motions, 1):
             result = simulate(benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True)
-            _save_run(out, one, result, {"trial": trial, "seed": seed, "integrator": integrator})
+            _save_run(out, one, drive.name, result, about, mat)
             for notice in one.notices:
                 console.print(f"[yellow]Note:[/] {notice}", highlight=False)
             console.print(str(result), highlight=False)
@@ -140,32 +139,41 @@ def run(
         raise typer.Exit(1)
 
 
-def _save_run(out: Path, motion, result, settings: dict) -> None:
-    stem = f"{motion.name}_{result.controller}"
-    signals = {name: np.asarray(value)[0] for name, value in result.signals.items()}
-    with atomic(out / f"{stem}_signals.npz") as part:
-        np.savez_compressed(
-            part, time=motion.time, ground=motion.acceleration, ref=result.reference, **signals
-        )
-    with (
-        atomic(out / f"{stem}_indices.csv") as part,
-        part.open("w", encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.writer(file)
-        writer.writerow(["index", "value"])
-        writer.writerows((name, repr(float(v[0]))) for name, v in indices(result).items())
+def _save_run(out: Path, motion, name: str, result, settings: dict, mat: bool) -> None:
+    stem = f"{safe_name(motion.name)}_{safe_name(name)}"
+    signals = {
+        "time": motion.time,
+        "ground": motion.acceleration,
+        "ref": result.reference,
+        **{key: np.asarray(value)[0] for key, value in result.signals.items()},
+    }
+    values = {key: float(v[0]) for key, v in indices(result).items()}
     about = settings | {
         "motion": motion.name,
         "source": motion.source,
         "sha256": motion.sha256,
         "scale": motion.scale,
         "fs": result.fs,
-        "controller": result.controller,
+        "controller": name,
         "status": result.describe(0),
         "volt_peak": np.asarray(result.watch.volt_peak)[0].tolist(),
     }
+    with atomic(out / f"{stem}_signals.npz") as part:
+        np.savez_compressed(part, **signals)
+    with atomic(out / f"{stem}_indices.csv") as part:
+        rows = [f"{key},{value!r}\n" for key, value in values.items()]
+        part.write_text("index,value\n" + "".join(rows), encoding="utf-8")
     with atomic(out / f"{stem}_run.json") as part:
         part.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+    if mat:
+        save_mat(out / f"{stem}.mat", signals | {"indices": values, "about": _for_matlab(about)})
+
+
+def _for_matlab(value):
+    """Nothing, which MATLAB has no word for, as an empty array."""
+    if isinstance(value, dict):
+        return {key: _for_matlab(item) for key, item in value.items()}
+    return np.empty(0) if value is None else value
 
 
 def _print_indices(result) -> None:

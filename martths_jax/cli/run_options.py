@@ -10,6 +10,7 @@ import typer
 
 from martths_jax.cli.console import error_console
 from martths_jax.study import Bars, Lines, Reporter
+from martths_jax.study.given import split_list
 
 Config = Annotated[
     Path | None, typer.Option("--config", help="TOML file of a study; flags override it.")
@@ -19,7 +20,9 @@ Controllers = Annotated[
     typer.Option(
         "--controllers",
         "--controller",
-        help="Controllers, separated by commas or repeated; adfc if left out.",
+        metavar="[NAME=]KIND[{KEY=VALUE,...}]",
+        help="Controllers, separated by commas or repeated, such as lqg or "
+        "'slow=adfc{nb=2048,no=2047}'; adfc if left out.",
     ),
 ]
 MotionList = Annotated[str | None, typer.Option("--motions", help="Motions separated by commas.")]
@@ -41,7 +44,7 @@ def words(texts: list[str] | None) -> list[str] | None:
     """Words of options that may be repeated and hold several, separated by commas."""
     if not texts:
         return None
-    return [word.strip() for text in texts for word in text.split(",") if word.strip()]
+    return [word for text in texts for word in split_list(text)]
 
 
 def given_settings(motions: list[str] | None, motion_list: str | None, **settings) -> dict:

@@ -28,12 +28,13 @@ from martths_jax.cli.run_options import (
     reporter_for,
     say_what_is_kept,
     set_devices,
+    words,
 )
 from martths_jax.errors import InputError, argument_error
 from martths_jax.study import Study, merge_runs, open_study, run_study
 from martths_jax.study.config import make_config, read_toml
 from martths_jax.study.distributed import JOIN_TIMEOUT, LOST_TIMEOUT, join
-from martths_jax.study.export import export_plants, write_csv, write_mat
+from martths_jax.study.export import export_plants, study_signals, write_csv, write_mat
 from martths_jax.study.provenance import command_line
 from martths_jax.study.template import write_template
 from martths_jax.text import counted
@@ -53,7 +54,12 @@ def study(
     seed: Annotated[int | None, typer.Option("--seed", help="Seed of all draws [1].")] = None,
     controllers: Annotated[
         list[str] | None,
-        typer.Option("--controller", help="lqg, adfc, passthrough; may be repeated [lqg, adfc]."),
+        typer.Option(
+            "--controller",
+            metavar="[NAME=]KIND[{KEY=VALUE,...}]",
+            help="lqg, adfc or passthrough, also as 'slow=adfc{nb=2048,no=2047}'; repeated or with "
+            "commas [lqg, adfc].",
+        ),
     ] = None,
     motions: Motions = None,
     records: Records = None,
@@ -117,7 +123,7 @@ def study(
 ) -> None:
     """Run controllers x motions x uncertain plants; resumes and extends what is in the folder."""
     given = {
-        "trials": trials, "seed": seed, "controllers": controllers or None, "motions":
+        "trials": trials, "seed": seed, "controllers": words(controllers), "motions":
         motions or None, "records": records, "scale": scale, "pga": pga, "sa": sa, "units": units,
         "dt": dt, "variable": variable, "resample": resample, "draws": draws, "plants": plants,
         "plants_as": plants_as,
@@ -204,16 +210,24 @@ def export(
     plants: Annotated[
         Path | None, typer.Option("--plants", help="CSV file for the plants' parameters.")
     ] = None,
+    signals: Annotated[
+        bool,
+        typer.Option("--signals/--no-signals", help="Stored signals go into the MATLAB file."),
+    ] = True,
 ) -> None:
-    """Write a finished study's results or plants for other tools."""
-    asked = [(mat, write_mat), (csv, write_csv), (plants, export_plants)]
-    if not any(path for path, _ in asked):
+    """Write a finished study's results, signals or plants for other tools."""
+    if not any((mat, csv, plants)):
         raise InputError("Say what to export: --mat FILE, --csv FILE or --plants FILE.")
-    dataset = open_study(folder).dataset
-    for path, write in asked:
-        if path is not None:
-            write(dataset, path)
-            console.print(f"Wrote {escape(str(path))}", soft_wrap=True)
+    done = open_study(folder)
+    stored = signals and (folder / "signals.nc").is_file()
+    if mat is not None:
+        write_mat(done.dataset, mat, study_signals(done) if stored else ())
+    if csv is not None:
+        write_csv(done.dataset, csv)
+    if plants is not None:
+        export_plants(done.dataset, plants)
+    for path in filter(None, (mat, csv, plants)):
+        console.print(f"Wrote {escape(str(path))}", highlight=False, soft_wrap=True)
 
 
 def trial_list(text: str | None) -> list[int] | None:

@@ -17,7 +17,7 @@ from martths_jax.figures import histories, paired, plants, spread, structure, sy
 from martths_jax.figures.source import ZOOM, Source, open_source
 from martths_jax.figures.style import Drawing, house_style, save
 from martths_jax.files import safe_name
-from martths_jax.study.summary import PAIR
+from martths_jax.study.summary import PAIR, pairs
 
 __all__ = ["Drawing", "Source", "draw_figures", "drawings", "figure_list", "open_source"]
 
@@ -47,8 +47,9 @@ def figure_list(source: Source) -> dict[str, Callable[[], Drawing]]:
     for controller in source.controllers:
         found[f"fig14b_motions{tails[controller]}"] = partial(spread.motions, source, controller)
     found["fig15_histograms"] = partial(spread.histograms, source)
-    if set(PAIR) <= set(source.controllers):
-        found["paired"] = partial(paired.paired, source)
+    for pair in pairs(source.study.dataset):
+        tail = "" if pair == PAIR else f"_{'_'.join(map(safe_name, pair))}"
+        found[f"paired{tail}"] = partial(paired.paired, source, pair)
     found["ecdf"] = partial(spread.ecdf, source)
     found["bode"] = partial(plants.bode, source)
     if signals:

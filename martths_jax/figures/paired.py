@@ -16,10 +16,9 @@ from martths_jax.figures.style import (
 )
 from martths_jax.indices import NAMES
 from martths_jax.study.statistics import LEVEL, compare
-from martths_jax.study.summary import PAIR
 
 
-def paired(source: Source) -> Drawing:
+def paired(source: Source, pair: tuple[str, str]) -> Drawing:
     """Median relative difference and win rate of every index, motion by motion.
 
     The difference is that of magnitudes of the same trial, in percent of the second controller's
@@ -40,7 +39,7 @@ def paired(source: Source) -> Drawing:
         at = np.arange(len(NAMES)) + (i - (len(source.motions) - 1) / 2) * width
         bars, wins = [], []
         for name in NAMES:
-            first, second = (source.values(c, motion, name) for c in PAIR)
+            first, second = (source.values(c, motion, name) for c in pair)
             found = compare(first, second)
             size = float(np.nanmedian(np.abs(second))) if np.isfinite(second).any() else np.nan
             d, w = found.difference, found.wins
@@ -57,7 +56,7 @@ def paired(source: Source) -> Drawing:
             axis.plot(at, middle, ls="", marker=shape["marker"], color=shape["color"], ms=3.2,
                       mfc="white" if i % 2 == 0 else shape["color"], mew=0.8,
                       label=motion_label(motion))  # fmt: skip
-    first, second = map(controller_label, PAIR)
+    first, second = map(controller_label, pair)
     top.axhline(0, color="black", lw=0.7)
     bottom.axhline(50, color="black", lw=0.7)
     top.set_ylabel(f"median |{first}| − |{second}|\n[% of {second}'s median]")

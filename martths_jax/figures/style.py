@@ -88,7 +88,12 @@ def new_figure(width_mm: float, height_mm: float):
 
 def look(position: int) -> dict:
     """Colour, dashes and marker of the thing at a position among those compared."""
-    return LOOKS[position % len(LOOKS)]
+    base = LOOKS[position % len(LOOKS)]
+    if position < len(LOOKS):
+        return base
+    # The same colours again, each with another one's dashes and marker, and filled.
+    other = LOOKS[(position + position // len(LOOKS)) % len(LOOKS)]
+    return base | {"ls": other["ls"], "marker": other["marker"], "fill": base["color"]}
 
 
 def line(position: int) -> dict:

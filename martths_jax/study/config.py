@@ -18,6 +18,7 @@ from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import DEFAULT_SCALE, Motion
 from martths_jax.sensors import SensorNoise
 from martths_jax.study.fields import BY_NAME, FIELDS, SECTIONS
+from martths_jax.study.given import EXAMPLE, expand
 from martths_jax.text import shortened
 
 
@@ -26,7 +27,9 @@ class StudyConfig:
     """Controllers x motions x trials, and how to run them.
 
     ``fields.FIELDS`` says what each setting means.  From Python, `controllers` may hold
-    ``Controller`` objects and `motions` ``Motion`` objects beside names.
+    ``Controller`` objects and `motions` ``Motion`` objects beside names; ``make_config`` takes
+    `controllers` in all forms of ``given``, such as ``["adfc", "slow=adfc{nb=2048,no=2047}"]`` or
+    ``{"adfc": "adfc", "slow": ADFC(nb=2048, no=2047)}``.
 
     Attributes:
         controller: settings of the controllers by name, as in ``{"adfc": {"pull": 1e-6}}``; a new
@@ -79,7 +82,8 @@ class StudyConfig:
                 continue
             names = [g if isinstance(g, str) else g.name for g in given]
             for name in sorted({n for n in names if names.count(n) > 1}):
-                found.append(f"Argument `{what}` names {name!r} twice.")
+                hint = f"; give one a name, as in {EXAMPLE}" if what == "controllers" else ""
+                found.append(f"Argument `{what}` names {name!r} twice{hint}.")
         if self.plants and self.draws != "independent":
             found.append("Arguments `plants` and `draws` exclude each other; give one of them.")
         return found
@@ -103,9 +107,17 @@ def make_config(given=None, **changes) -> StudyConfig:
     else:
         known = {f.name for f in fields(StudyConfig)}
         raise_all(unknown_names(sorted(set(changes) - known), known, "Setting"))
-        given = replace(given, **{k: _plain(v) for k, v in changes.items()})
+        given = _expanded(replace(given, **{k: _plain(v) for k, v in changes.items()}))
     raise_all(given.problems())
     return given
+
+
+def _expanded(config: StudyConfig) -> StudyConfig:
+    """With names for controllers that were given by their settings, and tables for the names."""
+    if not isinstance(config.controller, Mapping):
+        raise argument_error("controller", "map names to settings", shortened(config.controller))
+    controllers, tables = expand(config.controllers, config.controller)
+    return replace(config, controllers=controllers, controller=tables)
 
 
 def _plain(value):
@@ -120,6 +132,10 @@ def _from_mapping(settings: dict) -> StudyConfig:
     known = {f.name for f in fields(StudyConfig)}
     problems = unknown_names(sorted(set(settings) - known), known, "Setting")
     config = StudyConfig(**{k: _plain(v) for k, v in settings.items() if k in known})
+    try:
+        config = _expanded(config)
+    except InputError as error:
+        problems.append(str(error))
     raise_all([*problems, *config.problems()])
     return config
 

@@ -85,7 +85,8 @@ FIELDS = (
           "be a whole number from 0 to 2^63 - 1",
           "Plant and sensor noise of trial i depend on (seed, i) alone."),
     Field("controllers", "study", _is_list, "be a list of at least one controller",
-          "Controllers to compare: lqg, adfc, passthrough or names of [controller.NAME] tables."),
+          "Controllers to compare: lqg, adfc, passthrough, NAME=KIND{KEY=VALUE,...}, or names of "
+          "[controller.NAME] tables."),
     Field("draws", "study", one_of(DRAWS), _choice(DRAWS),
           "independent (extendable), lhs or sobol (spread evenly; they depend on `trials`)."),
     Field("spread", "study", lambda v: is_number(v) and v >= 0, "be zero or positive",

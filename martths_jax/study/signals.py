@@ -63,9 +63,7 @@ def choose_trials(dataset: xr.Dataset, controller: str, motion: str, keep) -> di
     return {trial: "+".join(names) for trial, names in roles.items()}
 
 
-def store_signals(
-    engine: Engine, dataset: xr.Dataset, path: Path, keep, identity: str
-) -> None:
+def store_signals(engine: Engine, dataset: xr.Dataset, path: Path, keep, identity: str) -> None:
     """Run the chosen trials again and write their signals, whole or not at all.
 
     Args:

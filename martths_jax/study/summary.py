@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from martths_jax.study.statistics import LEVEL, PERCENTS, Estimate, compare, per
 from martths_jax.text import counted, markdown_text
 from martths_jax.watch import Status
 
-#: The paper's comparison: this controller against that one.
+#: The paper's comparison: this kind of controller against that one.
 PAIR = ("adfc", "lqg")
 
 
@@ -75,10 +76,30 @@ def summarise(dataset: xr.Dataset) -> Summary:
     cells = [(c, m) for m in dataset.motion.values for c in dataset.controller.values]
     tables = [_ends(dataset, cells)]
     tables += [_percentiles(dataset, *cell) for cell in cells]
-    if set(PAIR) <= set(dataset.controller.values):
-        tables += [_paired(dataset, motion) for motion in dataset.motion.values]
+    for pair in pairs(dataset):
+        tables += [_paired(dataset, motion, pair) for motion in dataset.motion.values]
     tables.append(_nominal(dataset))
     return Summary(f"Study of {extent(dataset)}", tables)
+
+
+def pairs(dataset: xr.Dataset) -> list[tuple[str, str]]:
+    """(first, second) controllers that are compared trial by trial.
+
+    The paper's comparison, by the kinds of the controllers, and each further setting of a kind
+    against the first of that kind.
+    """
+    names = [str(name) for name in dataset.controller.values]
+    try:
+        tables = json.loads(dataset.attrs["identity"])["controller"]
+    except (KeyError, ValueError):  # a very long identity is stored shortened
+        tables = {}
+    kind = {name: str(tables.get(name, {}).get("kind", name)).lower() for name in names}
+    kind |= {name: name for name in PAIR if name in names}
+    of = {k: [name for name in names if kind[name] == k] for k in dict.fromkeys(kind.values())}
+    for k, group in of.items():
+        group.sort(key=lambda name: name != k)  # the one called like its kind comes first
+    found = [(of[PAIR[0]][0], of[PAIR[1]][0])] if set(PAIR) <= set(of) else []
+    return found + [(other, group[0]) for group in of.values() for other in group[1:]]
 
 
 def extent(dataset: xr.Dataset) -> str:
@@ -132,22 +153,22 @@ def _percentiles(dataset, controller: str, motion: str) -> Table:
     return Table(title, heads, rows, (note,), aside=("trials", "nominal"))
 
 
-def _paired(dataset, motion: str) -> Table:
-    first, second = (dataset.value.sel(controller=c, motion=motion).values[1:] for c in PAIR)
+def _paired(dataset, motion: str, pair: tuple[str, str]) -> Table:
+    first, second = (dataset.value.sel(controller=c, motion=motion).values[1:] for c in pair)
     rows = []
     for i, name in enumerate(NAMES):
-        pair = compare(first[:, i], second[:, i])
+        found = compare(first[:, i], second[:, i])
         rows.append((
-            name, with_interval(pair.difference),
-            f"{pair.wins.value:.1%} [{pair.wins.low:.1%}, {pair.wins.high:.1%}]",
-            str(pair.ties), str(pair.wins.trials),
+            name, with_interval(found.difference),
+            f"{found.wins.value:.1%} [{found.wins.low:.1%}, {found.wins.high:.1%}]",
+            str(found.ties), str(found.wins.trials),
         ))  # fmt: skip
     heads = ("index", "median difference", "win rate", "ties", "pairs")
     note = (
-        f"Difference |{PAIR[0]}| - |{PAIR[1]}| of the same trial, negative = {PAIR[0]} is better; "
-        f"win = {PAIR[0]} strictly better; only trials that neither controller lost."
+        f"Difference |{pair[0]}| - |{pair[1]}| of the same trial, negative = {pair[0]} is better; "
+        f"win = {pair[0]} strictly better; only trials that neither controller lost."
     )
-    return Table(f"{PAIR[0]} versus {PAIR[1]} on {motion}", heads, rows, (note,))
+    return Table(f"{pair[0]} versus {pair[1]} on {motion}", heads, rows, (note,))
 
 
 def _nominal(dataset) -> Table:

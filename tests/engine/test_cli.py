@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 from typer.testing import CliRunner
 
 from martths_jax import cli, published
@@ -45,10 +46,11 @@ def test_run_saves_signals_indices_and_settings(motion_file, tmp_path):
     out = tmp_path / "out"
     result = invoke(
         "run", "--motion", motion_file, "--controller", "lqg", "--trial", 3, "--seed", 5,
-        "--scale", 1.0, "--out", out,
+        "--scale", 1.0, "--out", out, "--mat",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     assert sorted(p.name for p in out.iterdir()) == [
+        "burst_lqg.mat",
         "burst_lqg_indices.csv",
         "burst_lqg_run.json",
         "burst_lqg_signals.npz",
@@ -64,6 +66,11 @@ def test_run_saves_signals_indices_and_settings(motion_file, tmp_path):
     assert by_name["J2_1"] == pytest.approx(j2[0])
     about = json.loads((out / "burst_lqg_run.json").read_text())
     assert (about["trial"], about["seed"], about["scale"]) == (3, 5, 1.0)
+    assert about["settings"]["kind"] == "lqg" and len(about["settings"]["e"]) == 2
+    back = loadmat(out / "burst_lqg.mat", simplify_cells=True)
+    for name in signals.files:
+        assert np.array_equal(back[name], signals[name]), name
+    assert back["indices"] == by_name and back["about"]["settings"]["q"] == about["settings"]["q"]
 
 
 def test_a_trial_that_diverges_ends_the_run_with_a_sentence_and_exit_code_1(motion_file, tmp_path):
