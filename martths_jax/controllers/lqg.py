@@ -15,23 +15,42 @@ from martths_jax.errors import argument_error
 from martths_jax.kalman import design_kalman
 from martths_jax.structure.modal import contract
 
+#: What is integrated -> weights fitted to Table 4's LQG column with it (experiments/calibrate_lqg).
+FITTED = {
+    "estimate": {
+        "e": (10**9.902, 10**3.753),
+        "r": (1.0, 10**-1.009),
+        "y": (10**0.784, 10**1.566),
+        "q": 3e-3,
+    },
+    "measured": {
+        "e": (10**9.766, 10**3.738),
+        "r": (1.0, 10**-0.907),
+        "y": (10**0.699, 10**1.580),
+        "q": 3e-5,
+    },
+}
+
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class LQG(Controller):
-    """u(k) = -K_z z_hat(k) - K_e e(k), with e(k) = e(k-1) + dt (x_a(k) - x_m(k)).
+    """u(k) = -K_z z_hat(k) - K_e e(k), with e(k) = e(k-1) + dt (x_a(k) - x(k)).
 
     Attributes:
         K_z: (2, 2, m) or (2, 2, m, T) gain on the estimated plant state, slot by slot.
         K_e: (2, 2) or (2, 2, T) gain on the integral of the tracking error [1/s].
         estimator: the Kalman filter.
         weights: what the gains were designed from, for the record.
+        error: what x is, and so which error is integrated: the ``measured`` strokes x_m, or the
+            filter's ``estimate`` x_hat of them.
     """
 
     K_z: jax.Array
     K_e: jax.Array
     estimator: Any
     weights: tuple = field(default=(), metadata={"static": True})
+    error: str = field(default="measured", metadata={"static": True})
 
     name = "lqg"
 
@@ -40,10 +59,11 @@ class LQG(Controller):
         cls,
         benchmark,
         *,
-        e: tuple[float, float] = (10**9.766, 10**3.738),
-        r: tuple[float, float] = (1.0, 10**-0.907),
-        y: tuple[float, float] = (10**0.699, 10**1.580),
-        q: float = 3e-5,
+        e: tuple[float, float] | None = None,
+        r: tuple[float, float] | None = None,
+        y: tuple[float, float] | None = None,
+        q: float | None = None,
+        error: str = "estimate",
     ) -> LQG:
         """Gains from the continuous-time Riccati equation of the plant with integral action.
 
@@ -56,14 +76,21 @@ class LQG(Controller):
             r: weights of the two commands [-].
             y: weights of the two strokes [-].
             q: process noise of the Kalman filter [mm^2].
+            error: integrate that of the ``estimate`` or of the ``measured`` strokes.
 
-        The published weights are not known.  The defaults are the least-squares fit of these
-        weights to Table 4's LQG column, with the filter of ADFC's default and valve commands of at
-        most 3.3 V on the nominal plant (experiments/calibrate_lqg).
+        The published weights are not known.  Those left out are ``FITTED`` for `error`: the
+        least-squares fit of e, r and y to Table 4's LQG column, which says next to nothing of q.
+        The Riccati equation is the same for both errors, as it knows no noise.
 
         Raises:
-            InputError: if a weight is not positive (y may be zero) or no solution exists.
+            InputError: if a weight is not positive (y may be zero), no solution exists, or `error`
+                is neither of the two.
         """
+        if error not in FITTED:
+            raise argument_error("error", f"be one of {sorted(FITTED)}", repr(error))
+        given = {"e": e, "r": r, "y": y, "q": q}
+        given = FITTED[error] | {name: w for name, w in given.items() if w is not None}
+        e, r, y, q = (given[name] for name in "eryq")
         for name, pair, low in (("e", e, 0.0), ("r", r, 0.0), ("y", y, -1e-300)):
             pair = np.asarray(pair, dtype=float)
             if pair.shape != (2,) or not np.all(np.isfinite(pair) & (pair > low)):
@@ -87,7 +114,13 @@ class LQG(Controller):
             K_e=jnp.asarray(K[:, n:]),
             estimator=design_kalman(benchmark.plant_model, q, benchmark.r_mm2),
             weights=(("e", tuple(e)), ("r", tuple(r)), ("y", tuple(y)), ("q", float(q))),
+            error=error,
         )
+
+    def problems(self, benchmark):
+        if self.error in FITTED:
+            return []
+        return [str(argument_error("error", f"be one of {sorted(FITTED)}", repr(self.error)))]
 
     def prepare(self, benchmark):
         # Designs that differ in numbers only share a program, and can be mixed trial by trial.
@@ -97,6 +130,7 @@ class LQG(Controller):
         return jnp.zeros((2, trials))
 
     def step(self, state, seen):
-        error = state + seen.dt * (seen.target_mm - seen.measured_mm)
+        reached = seen.measured_mm if self.error == "measured" else seen.estimate_mm
+        error = state + seen.dt * (seen.target_mm - reached)
         command = -contract(self.K_z, seen.state, axes=2) - contract(self.K_e, error)
         return error, Decision(command_mm=command, signals={"error_integral": error})
