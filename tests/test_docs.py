@@ -21,7 +21,7 @@ import typer
 
 from martths_jax.cli import app
 from martths_jax.motions import load
-from tests.figures.small_study import study_folder  # noqa: F401
+from tests.figures.small_study import study_folder  # noqa: F401, F811
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -69,7 +69,7 @@ def short(monkeypatch):
 
 
 @pytest.mark.parametrize("page", WITH_CODE, ids=named)
-def test_python_runs(page, short, study_folder, tmp_path, monkeypatch, capsys):
+def test_python_runs(page, short, study_folder, tmp_path, monkeypatch, capsys):  # noqa: F811
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study").symlink_to(study_folder)  # figures of a study that was run before
     names: dict = {}
@@ -161,7 +161,7 @@ def test_a_wrong_command_is_found(line):
 
 @pytest.mark.parametrize("page", PAGES, ids=named)
 def test_options_in_the_text_exist(page):
-    """Options named in prose belong to some command; those of other programs are not in backticks."""
+    """Options named in prose belong to some command; those of other programs have no backticks."""
 
     def options(command) -> set[str]:
         own = {o for p in command.params for o in (*p.opts, *p.secondary_opts)}
