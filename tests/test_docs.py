@@ -21,7 +21,7 @@ import typer
 
 from martths_jax.cli import app
 from martths_jax.motions import load
-from tests.figures.small_study import study_folder  # noqa: F401, F811
+from tests.figures.small_study import study_folder  # noqa: F401
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
