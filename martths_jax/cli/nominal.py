@@ -126,8 +126,6 @@ def run(
         for done, one in enumerate(motions, 1):
             result = simulate(benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True)
             _save_run(out, one, result, {"trial": trial, "seed": seed, "integrator": integrator})
-            for notice in one.notices:
-                console.print(f"[yellow]Note:[/] {notice}", highlight=False)
             console.print(str(result), highlight=False)
             _print_indices(result)
             tell(done)

@@ -8,8 +8,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from martths_jax.cli import motion_options as options
 from martths_jax.cli import app as main_app
+from martths_jax.cli import motion_options as options
 from martths_jax.cli.motions import app
 from martths_jax.errors import InputError
 
