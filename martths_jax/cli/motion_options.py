@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
+from martths_jax.cli.console import console
 from martths_jax.motions import DEFAULT_SCALE, Motion, load_motion
 
 Motions = Annotated[
@@ -75,8 +77,8 @@ def load_all(
     dt: float | None = None,
     variable: str | None = None,
 ) -> list[Motion]:
-    """Every motion of a command, from the values of its options."""
-    return [
+    """Every motion of a command, from the values of its options; prints their notices."""
+    found = [
         load_motion(
             motion,
             scale=DEFAULT_SCALE if scale is None else scale,
@@ -91,3 +93,6 @@ def load_all(
         )
         for motion in motions
     ]
+    for notice in (notice for one in found for notice in one.notices):
+        console.print(f"[yellow]Note:[/] {escape(notice)}", highlight=False, soft_wrap=True)
+    return found

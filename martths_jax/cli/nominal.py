@@ -125,8 +125,6 @@ def run(
         for done, one in enumerate(motions, 1):
             result = simulate(benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True)
             _save_run(out, one, drive.name, result, about, mat)
-            for notice in one.notices:
-                console.print(f"[yellow]Note:[/] {notice}", highlight=False)
             console.print(str(result), highlight=False)
             _print_indices(result)
             if result.lost[0]:

@@ -107,6 +107,37 @@ def test_time_in_other_units(write, unit):
     refused(["found the time in 'm'", "`dt` (--dt)"], write(f"time [m],acc [g]\n{text}"))
 
 
+@pytest.mark.parametrize(
+    "said",
+    ["dt = 0.005", "dt=5 ms", "dt [ms]: 5", "time step = 0.005 s", "Time step (s): 0.005",
+     "dt 0.005", "fs = 200 Hz", "sampling rate: 200", "Sampling Frequency (Hz) = 200", "dt = 0,005",
+     "NPTS=   400, DT=   .0050 SEC,", "  400    0.0050    NPTS, DT",
+     "sampling interval is 0.005 sec", "number of points: 400, dt = .5D-2"],
+)  # fmt: skip
+def test_steps_in_headers(write, said):
+    check(write(f"# {said}\nacc [g]\n" + rows(WAVE)))
+    refused(["`dt` (--dt) says 0.01 s"], write(f"# {said}\nacc [g]\n" + rows(WAVE)), dt=0.01)
+
+
+@pytest.mark.parametrize(
+    "title",
+    ["acc [g]", "acc (g)", "acc in g", "acc, g", "acc_g", "a/g", "Beschleunigung / g", "acc g",
+     "NS [g]", "Acceleration (NS) [g]", "Acceleration, units: g", "# UNITS OF G\nacc",
+     "# units: s, g\nacc", "# The units are (g)\nacc", "# acceleration in g\nvalue", "acc\ng",
+     "# Acceleration (g)\n# more", "# acc [g]\n# Vs30 = 300 m/s\nSite (B)", "# PGA = 0.3 (m/s2)\nacc [g]"],
+)  # fmt: skip
+def test_where_a_unit_may_stand(write, title):
+    check(write(title + "\n" + rows(WAVE)), dt=DT)
+    refused(["its unit is g"], write(title + "\n" + rows(WAVE)), dt=DT, units="cm/s2")
+
+
+@pytest.mark.parametrize("title", ["acc_V", "acc (N)", "Event (1/2/1999)", "PGA = 294.2 [cm/s2]"])
+def test_what_is_no_unit(write, title):
+    path = write(title + "\n" + rows(WAVE))
+    refused(["does not say the unit"], path, dt=DT)
+    check(path, units="g", dt=DT)
+
+
 def test_rows_that_are_counted(write):
     for first in (0, 1):
         text = rows(np.arange(N) + first, WAVE)
@@ -301,7 +332,7 @@ def test_memory_counts_all_arrays_and_sees_into_cells(tmp_path, monkeypatch):
     monkeypatch.setattr(psutil, "virtual_memory", Little)
     with h5py.File(tmp_path / "many.mat", "w") as file:
         for k in range(10):
-            file.create_dataset(f"a{k}", (2, 100_000), chunks=(2, 1000), fillvalue=1.0)
+            file.create_dataset(f"a{k}", (2, 100_000), "f4", chunks=(2, 1000), fillvalue=1.0)
     refused(["GiB", "all that it holds"], tmp_path / "many.mat", units="g", variable="a0")
     cell = np.empty((1, 1), dtype=object)
     cell[0, 0] = np.zeros(2_000_000)

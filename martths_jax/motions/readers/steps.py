@@ -11,7 +11,7 @@ from ...errors import InputError
 from ..units import time_unit
 
 _NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][-+]?\d+)?"
-_UNIT = r"(?:\s*[\[(]?\s*(?P<{}>[a-zA-Zµμ]+)\.?\s*[\])]?)?"
+_UNIT = r"(?:\s*[\[(]?\s*(?P<{}>(?!(?:is|of)\b)[a-zA-Zµμ]+)\.?\s*[\])]?)?"
 _STEP = re.compile(
     r"(?<![^\W_])(?:dt|delta[ _]?t|Δt|time[ _]?(?:step|interval|increment)|sampling[ _]"
     r"(?:interval|period|time|step))(?:_(?P<tail>m?s))?(?![^\W_])"
