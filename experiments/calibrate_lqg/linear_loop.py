@@ -113,12 +113,13 @@ class LinearLoop:
         between = high[:-1, None] * (1 - part) + high[1:, None] * part
         return np.concatenate([low, between.reshape(-1, H.shape[1]), high[-1:]])
 
-    def indices(self, K, L):
+    def indices(self, K, L, error="measured"):
         """Mean indices over the records, and the interpolated delays of each.
 
         Args:
             K: (2, 10) gain on (z_hat, e), states slot by slot.
             L: (8, 2) filter gain.
+            error: which one is integrated, as ``LQG`` has it.
 
         Returns:
             mapping of the 24 (delays in whole samples, as printed), (records, 4) delays in samples,
@@ -134,8 +135,10 @@ class LinearLoop:
         C_m, C_u = both[:, 2:, :2] + direct[2:], both[:, 2:, 2:]
         I = np.eye(2)
         KE = K_e * self.integrator
-        front = inverse(I + Kz_u)
-        U_m, U_a = front @ (KE - Kz_m), -front @ KE
+        # The integral answers the measurement itself, or what the filter makes of it.
+        KE_m, KE_u = (KE, 0 * KE) if error == "measured" else (KE @ C_m, KE @ C_u)
+        front = inverse(I + Kz_u - KE_u)
+        U_m, U_a = front @ (KE_m - Kz_m), -front @ KE
         S = inverse(I - self.plant @ U_m)
         T = S @ self.plant @ U_a
         hat_a, hat_w = C_m @ T + C_u @ (U_m @ T + U_a), (C_m + C_u @ U_m) @ S

@@ -39,6 +39,7 @@ def main():
     loops = {
         "passthrough": Passthrough(q=ADFC().q).prepare(bench),
         "LQG (defaults)": LQG.design(bench),
+        "LQG (measured error)": LQG.design(bench, error="measured"),
         "inverse, never adapted": frozen_adfc(bench, ADFC(), inverse(bench)),
         "ADFC frozen at 12 s": frozen_adfc(bench, ADFC(), np.moveaxis(middle, 0, -1)),
     }

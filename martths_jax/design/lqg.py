@@ -22,16 +22,19 @@ from martths_jax.structure.modal import to_dense
 WEIGHTS = ("e1", "e2", "r2", "y1", "y2", "q")
 
 
-def lqg_from_weights(benchmark: Benchmark, log_weights: Mapping[str, jax.Array]) -> LQG:
+def lqg_from_weights(
+    benchmark: Benchmark, log_weights: Mapping[str, jax.Array], error: str = "estimate"
+) -> LQG:
     """LQG controller from log10 of its weights.
 
     Args:
         benchmark: gives the nominal plant and the sensor noise.
         log_weights: log10 of each of ``WEIGHTS``: integrated errors e1, e2 [1/s^2], second command
             r2, strokes y1, y2 [-], process noise q of the filter [mm^2].  Scalars.
+        error: which one is integrated, as in ``LQG``.
 
     Returns:
-        The controller of ``LQG.design`` for e = (e1, e2), r = (1, r2), y = (y1, y2), q.
+        The controller of ``LQG.design`` for e = (e1, e2), r = (1, r2), y = (y1, y2), q, `error`.
     """
     check_precision()
     w = {name: 10.0 ** jnp.asarray(log_weights[name], dtype=float) for name in WEIGHTS}
@@ -44,7 +47,7 @@ def lqg_from_weights(benchmark: Benchmark, log_weights: Mapping[str, jax.Array])
     R = jnp.eye(2) * jnp.stack([one, w["r2"]])
     K_z, K_e = tracking_gains(benchmark, Q, R)
     estimator = KalmanFilter(benchmark.plant_model, kalman_gain(benchmark, w["q"]))
-    return LQG(K_z=K_z, K_e=K_e, estimator=estimator)
+    return LQG(K_z=K_z, K_e=K_e, estimator=estimator, error=error)
 
 
 def tracking_gains(

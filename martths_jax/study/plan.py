@@ -191,6 +191,7 @@ def build_controller(given, config: StudyConfig, benchmark: Benchmark) -> tuple[
         raise InputError(f"Controller {given!r}: {error}") from None
     except (TypeError, ValueError) as error:
         raise InputError(f"Controller {given!r} has a setting of the wrong type: {error}") from None
+    values |= dict(getattr(made, "weights", ()))  # those left out are LQG's to choose
     plain = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
     if dataclasses.is_dataclass(made) and made.name != given:
         made = _named(made, given)

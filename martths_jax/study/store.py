@@ -209,6 +209,7 @@ class RunFolder(Stored):
         """Leave the folder to others."""
         if self.owner is not None:
             self.owner.release()
+            self.owner = None
 
     def __enter__(self) -> RunFolder:
         return self

@@ -11,6 +11,7 @@ import numpy as np
 from martths_jax.benchmark import Benchmark
 from martths_jax.controllers import ADFC, LQG, Controller
 from martths_jax.controllers.adfc import GUARD_PULL
+from martths_jax.controllers.lqg import FITTED
 from martths_jax.design.lqg import WEIGHTS, kalman_gain, lqg_from_weights
 from martths_jax.errors import argument_error
 from martths_jax.kalman import KalmanFilter
@@ -29,9 +30,9 @@ def start_of(controller: str, given: Mapping[str, float] | None = None) -> dict[
     if controller not in TUNABLE:
         raise argument_error("controller", f"be one of {sorted(TUNABLE)}", repr(controller))
     if controller == "lqg":
-        d = LQG.design.__func__.__kwdefaults__
-        values = dict(e1=d["e"][0], e2=d["e"][1], r2=d["r"][1] / d["r"][0], y1=d["y"][0])
-        values |= dict(y2=d["y"][1], q=d["q"])
+        fitted = FITTED[LQG.design.__func__.__kwdefaults__["error"]]
+        (e1, e2), (r1, r2), (y1, y2) = (fitted[name] for name in "ery")
+        values = dict(e1=e1, e2=e2, r2=r2 / r1, y1=y1, y2=y2, q=fitted["q"])
     else:
         values = {"pull": GUARD_PULL, "q": ADFC().q}
     for name, value in (given or {}).items():

@@ -43,6 +43,8 @@ def test_same_controller_as_on_the_host(benchmark, design):
             (found.estimator.filter_gain[i], host.estimator.filter_gain),
         ):
             assert np.abs(ours - theirs).max() < 1e-8 * np.abs(theirs).max()
+    assert found.error == host.error == "estimate"
+    assert lqg_from_weights(benchmark, START, error="measured").error == "measured"
 
 
 def test_gradient_in_log_weights(benchmark, design):

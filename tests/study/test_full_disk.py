@@ -31,6 +31,7 @@ plan = build_plan(make_config(trials=40, motions=(motion,), controllers=("passth
 run = RunFolder.start(out / "run", header(plan, ""))
 run.write("passthrough", "m", np.arange(41), outcome(41))
 dataset = write_results(run)
+run.close()
 figure = new_figure(80, 60)
 figure.subplots().plot(np.random.rand(2000), "o")
 drawing = Drawing(figure, {"x": np.random.rand(2000)}, "")

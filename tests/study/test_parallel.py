@@ -58,6 +58,7 @@ def test_two_processes_of_the_distributed_runtime(whole, tmp_path, compile_cache
     ]  # fmt: skip
     errors = [w.communicate(timeout=300)[1] for w in workers]
     assert [w.returncode for w in workers] == [0, 0], errors
+    assert open_study(tmp_path).dataset.attrs == whole.dataset.attrs
     assert result_bytes(tmp_path) == result_bytes(whole.folder)
     sessions = json.loads((tmp_path / "provenance.json").read_text())["sessions"]
     assert sorted(s["trials"] for s in sessions) == [2 * 150, 2 * 151]
