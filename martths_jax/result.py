@@ -10,6 +10,7 @@ import numpy as np
 
 from martths_jax import watch as watching
 from martths_jax.indices import IndexSums, on_host, trials_last
+from martths_jax.text import counted
 from martths_jax.watch import Status
 
 
@@ -65,7 +66,7 @@ class Result:
     def __str__(self) -> str:
         number = self.trial.shape[0]
         head = (
-            f"{self.controller} on {self.motion}: {number} trial{'' if number == 1 else 's'} at "
+            f"{self.controller} on {self.motion}: {counted(number, 'trial')} at "
             f"{self.fs:g} Hz, {self.reference.shape[0]} samples"
         )
         status = self.status

@@ -11,6 +11,7 @@ import numpy as np
 
 from martths_jax.benchmark import VOLT_LIMIT, command_volts
 from martths_jax.indices import IndexSums, library, without_value
+from martths_jax.text import counted
 
 #: A command or stroke beyond this is a loop that has run away: the largest stroke in the study is
 #: about a tenth of it, and the coupler has no position for strokes 254 mm apart.
@@ -138,7 +139,7 @@ def describe(watch: Watch, sums: IndexSums, trial: int, fs: float) -> str:
                 f"peak {column('volt_peak')[i]:.3g} V"
             )
     if column("held"):
-        parts.append(f"{int(column('held'))} fits not used")
+        parts.append(f"{counted(int(column('held')), 'fit')} not used")
     return f"{status.name.lower()}: {'; '.join(parts)}" if parts else status.name.lower()
 
 

@@ -94,5 +94,5 @@ def _not_found(asked: str, path: Path, available: dict, matches: list, records) 
     hint = f"the folder of records is {looked}" if looked else "no folder of records is set"
     return (
         f"Motion {asked} is neither a file nor a known name (known: {choices}; {hint}); give a "
-        f"path, or the folder that holds it (--records DIR or ${RECORDS_VARIABLE})."
+        f"path, or the folder that holds it (`records`, --records DIR, or ${RECORDS_VARIABLE})."
     )

@@ -31,7 +31,7 @@ def open_beside(folder: Path | str) -> tuple[Summary, list[Path]]:
     marks = ", ".join(KINDS)
     raise InputError(
         f"{folder} holds no finished sweep, sensitivity study or tuning (none of {marks}); run "
-        "martths sweep, sensitivity or tune with --out there first."
+        "martths sweep, sensitivity or tune with --out (`out`) there first."
     )
 
 

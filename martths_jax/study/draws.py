@@ -152,8 +152,8 @@ def _columns(path: Path, header: list[str] | None, kind: str) -> tuple[list[int]
     if header is None:
         if kind == "auto":
             raise InputError(
-                f"Plants {path} has no header that says what its numbers are; give --plants-as "
-                "hz, rad/s or draws."
+                f"Plants {path} has no header that says what its numbers are; give `plants_as` "
+                "(--plants-as) hz, rad/s or draws."
             )
         return list(range(len(PARAMETERS))), kind
     endings = {"draws": ["_draw", ""], "hz": ["_hz", ""], "rad/s": [""], "auto": ["_draw", "_hz"]}

@@ -17,11 +17,11 @@ _REMEDIES = {
     errno.ENOSPC: "free some space and repeat the command: what is finished is kept",
     errno.EDQUOT: "your quota is full; free some space and repeat the command",
     errno.EFBIG: "the file system or a limit refuses files of this size",
-    errno.EACCES: "give --out a folder you may write to",
-    errno.EPERM: "give --out a folder you may write to",
-    errno.EROFS: "give --out a folder on a disk that can be written to",
-    errno.ENOTDIR: "a part of the path is a file; give --out another folder",
-    errno.EEXIST: "a file stands where the folder should be; give --out another folder",
+    errno.EACCES: "give --out (`out`) a folder you may write to",
+    errno.EPERM: "give --out (`out`) a folder you may write to",
+    errno.EROFS: "give --out (`out`) a folder on a disk that can be written to",
+    errno.ENOTDIR: "a part of the path is a file; give --out (`out`) another folder",
+    errno.EEXIST: "a file stands where the folder should be; give --out (`out`) another folder",
 }
 
 

@@ -63,7 +63,11 @@ def choose_chunk(
     # One block a device is the least there is; then it may take half of what is free.
     affordable = int((bound if memory_gb else max(bound, free / 2)) // each)
     if affordable < 1:
-        given = f"--memory {memory_gb:g} GB" if memory_gb else f"{free / GB:.2g} GB are free"
+        given = (
+            f"`memory_gb` (--memory) is {memory_gb:g} GB"
+            if memory_gb
+            else f"{free / GB:.2g} GB are free"
+        )
         raise InputError(
             f"One chunk of {lanes} trials over {samples} samples takes {each / GB:.2g} GB, but "
             f"{given}; free some memory or shorten the motions."

@@ -74,8 +74,9 @@ def run_study(
     config = make_config(config, **changes)
     if fresh and share is not None:
         raise InputError(
-            "Options --fresh and several processes exclude each other, since one would delete what "
-            "another has just stored; remove the folder first, or choose another --out."
+            "Several processes and --fresh (`fresh=True`) exclude each other, since one would "
+            "delete what another has just stored; remove the folder first, or choose another "
+            "--out (`out`)."
         )
     plan = build_plan(config)
     if share is None:

@@ -74,7 +74,7 @@ def write_template(path: Path, overwrite: bool = False) -> None:
         InputError: if the file exists already or cannot be written.
     """
     if path.exists() and not overwrite:
-        raise InputError(f"{path} exists already; give another name or --force.")
+        raise InputError(f"{path} exists already; give another name, or `overwrite` (--force).")
     write_text(path, template(path.name))
 
 

@@ -183,7 +183,7 @@ def test_the_chunk_follows_the_memory(monkeypatch):
     free["available"] = 0.5e9
     assert choose_chunk(52_162, 1, 128, 16) == (1, 128)
     assert choose_chunk(52_162, 1, 128, 2, memory_gb=0.5)[0] == 2
-    with pytest.raises(InputError, match=r"takes 0\.13 GB, but --memory 0\.1 GB"):
+    with pytest.raises(InputError, match=r"0\.13 GB, but `memory_gb` \(--memory\) is 0\.1 GB"):
         choose_chunk(52_162, 1, 128, 2, memory_gb=0.1)
     free["available"] = 0.1e9
     with pytest.raises(InputError, match=r"0\.1 GB are free"):
