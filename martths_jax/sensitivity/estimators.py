@@ -118,8 +118,7 @@ def verdicts(names, found: SobolIndices, samples: int) -> dict[str, str]:
         elif found.width[i] > TOO_WIDE:
             told[name] = (
                 f"N = {found.used} is too small: the widest confidence interval is "
-                f"{found.width[i]:.2g} wide; N = {_enough(found.width[i], found.used)} should "
-                f"bring it to {TOO_WIDE:g}."
+                f"{found.width[i]:.2g} wide; {_enough(found.width[i], found.used)}."
             )
         elif np.all(found.first_low[i] <= 0) and np.max(found.first[i]) < 0.05:
             told[name] = (
@@ -131,6 +130,9 @@ def verdicts(names, found: SobolIndices, samples: int) -> dict[str, str]:
     return told
 
 
-def _enough(width: float, used: int) -> int:
+def _enough(width: float, used: int) -> str:
     """Power of two at which an interval shrinks to ``TOO_WIDE``, as one over the root of N."""
-    return int(2 ** np.ceil(np.log2(used * (width / TOO_WIDE) ** 2)))
+    powers = np.ceil(np.log2(used) + 2 * np.log2(width / TOO_WIDE))
+    if powers > 30:  # resamples of few runs can have next to no variance
+        return "too wide to say how many would do"
+    return f"N = {2 ** int(powers)} should bring it to {TOO_WIDE:g}"

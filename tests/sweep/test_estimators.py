@@ -96,6 +96,15 @@ def test_what_means_nothing_is_said():
     assert verdicts(("a",), sobol(ishigami(saltelli(4096, 3, 1))[..., None]), 4096) == {"a": ""}
 
 
+@pytest.mark.parametrize("width", [1e306, np.inf])
+def test_an_interval_without_end_is_said(width):
+    """Of two base samples a resample can be one twice, with next to no variance."""
+    found = sobol(ishigami(saltelli(8, 3, 1))[..., None])
+    found.first_high[...] = width
+    told = verdicts(("a",), found, 8)["a"]
+    assert "N = 8 is too small" in told and "too wide to say how many would do" in told
+
+
 def test_a_lost_run_takes_its_base_sample_along():
     unit = saltelli(256, 3, seed=3)
     values = ishigami(unit)[..., None]
