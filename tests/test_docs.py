@@ -21,7 +21,7 @@ import typer
 
 from martths_jax.cli import app
 from martths_jax.motions import load
-from tests.figures.small_study import study_folder  # noqa: F401
+from tests.figures import small_study
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -69,9 +69,10 @@ def short(monkeypatch):
 
 
 @pytest.mark.parametrize("page", WITH_CODE, ids=named)
-def test_python_runs(page, short, study_folder, tmp_path, monkeypatch, capsys):  # noqa: F811
+def test_python_runs(page, short, tmp_path, tmp_path_factory, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "study").symlink_to(study_folder)  # figures of a study that was run before
+    # Figures are drawn of a study that was run before.
+    (tmp_path / "study").symlink_to(small_study.build(tmp_path_factory.getbasetemp() / "study"))
     names: dict = {}
     for block in CODE.finditer(page.read_text("utf-8")):
         tree = Shortened().visit(ast.parse(block.group(1)))
@@ -161,7 +162,7 @@ def test_a_wrong_command_is_found(line):
 
 @pytest.mark.parametrize("page", PAGES, ids=named)
 def test_options_in_the_text_exist(page):
-    """Options named in prose belong to some command; those of other programs have no backticks."""
+    """Options named in sentences belong to some command."""
 
     def options(command) -> set[str]:
         own = {o for p in command.params for o in (*p.opts, *p.secondary_opts)}
