@@ -12,6 +12,7 @@ from martths_jax.cli import app as main_app
 from martths_jax.cli import motion_options as options
 from martths_jax.cli.motions import app
 from martths_jax.errors import InputError
+from martths_jax.study.config import make_config, read_toml
 
 runner = CliRunner()
 
@@ -87,6 +88,17 @@ def test_dt_and_variable_reach_every_command(tmp_path):
         assert told.exit_code == 0
         for option in ("--units", "--dt", "--variable"):
             assert option in told.output, (name, option)
+
+
+@pytest.mark.parametrize("text", [r"C:\Users\me\a.csv", r"C:\temp\new.csv"])
+def test_windows_paths_in_toml(tmp_path, text):
+    path = tmp_path / "study.toml"
+    path.write_text(f'[motions]\nmotions = ["{text}"]\n')
+    with pytest.raises(InputError, match="single quotes"):
+        read_toml(path)
+    path.write_text(f"[motions]\nmotions = ['{text}']\nvariable = 2\ndt = 0.01\n")
+    assert read_toml(path)["motions"] == [text]
+    assert make_config(path).variable == 2
 
 
 def test_importing_motions_leaves_matplotlib_alone():

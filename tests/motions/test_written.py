@@ -77,12 +77,13 @@ def refused(words, path, **options):
         ("acc [g]\n# dt = 0.01 s\n# fs = 200 Hz\n", {}, "two time steps"),
         ("acc [g]\n# NPTS = 500\n", {}, "500 samples"),
         ("acc [g]\n# dt = 5 furlongs\n", {}, None),
+        ("acc [g]\n# scale factor = 0.001\n", {}, "scale factor 0.001 was not applied"),
     ],
 )
 def test_header(write, header, options, word):
     path = write(header + rows(WAVE))
     options = options if "dt" in header else {"dt": DT} | options
-    if word and "brackets" in word:
+    if word and ("brackets" in word or "applied" in word):
         check(path, notice=word, **options)
     elif word:
         refused([str(path), word], path, **options)
@@ -124,7 +125,8 @@ def test_steps_in_headers(write, said):
     ["acc [g]", "acc (g)", "acc in g", "acc, g", "acc_g", "a/g", "Beschleunigung / g", "acc g",
      "NS [g]", "Acceleration (NS) [g]", "Acceleration, units: g", "# UNITS OF G\nacc",
      "# units: s, g\nacc", "# The units are (g)\nacc", "# acceleration in g\nvalue", "acc\ng",
-     "# Acceleration (g)\n# more", "# acc [g]\n# Vs30 = 300 m/s\nSite (B)", "# PGA = 0.3 (m/s2)\nacc [g]"],
+     "# Acceleration (g)\n# more", "# acc [g]\n# Vs30 = 300 m/s\nSite (B)",
+     "# PGA = 0.3 (m/s2)\nacc [g]"],
 )  # fmt: skip
 def test_where_a_unit_may_stand(write, title):
     check(write(title + "\n" + rows(WAVE)), dt=DT)
@@ -231,6 +233,13 @@ def test_the_only_acceleration_is_taken(write):
     text = "t [s],vel [cm/s],acc [g],disp [cm]\n" + rows(TIME, TIME**2, WAVE, TIME**3)
     check(write(text))
     refused(["unknown unit 'cm/s'"], write(text), variable="vel")
+    for title in ("T (s),Sa (g)", "Period (s),PSA [g]", "T,spectral acceleration [g]"):
+        refused(["history"], write(f"{title}\n" + rows(TIME + DT, np.abs(WAVE))), dt=DT)
+
+
+def test_damaged_times_without_titles(write):
+    for times in (TIME[::-1], np.r_[TIME[:50], TIME[51:], TIME[-1] + DT]):
+        refused(["uniform step"], write(rows(times, WAVE)), units="g")
 
 
 def test_several_values_a_line(write):

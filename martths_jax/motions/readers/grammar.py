@@ -53,6 +53,11 @@ _OTHER = re.compile(
     r"freq\w*|period|sa|psa|spectr\w*)(?![^\W_])",
     re.IGNORECASE,
 )
+_SPECTRAL = re.compile(r"(?<![^\W_])(?:p?s[av]|sd|spectr\w*)(?![^\W_])", re.IGNORECASE)
+_FACTOR = re.compile(
+    r"\b(?:scal(?:e|ing)|conversion|multipl\w*)(?:[ _]?factor)?\s*[=:]\s*(\d[\d.,eE+-]*)",
+    re.IGNORECASE,
+)
 _DECLARED = re.compile(
     r"\bunits?\b(?P<word>\s*(?:of|are|is|in|:|=)+)?(?:\s*(?:of|are|is|in|:|=))*\s*", re.IGNORECASE
 )
@@ -81,8 +86,15 @@ class Cell:
         return bool(_COUNTER.fullmatch(self.name))
 
     @property
+    def is_spectral(self) -> bool:
+        """Whether the column says that it is a response spectrum."""
+        return bool(_SPECTRAL.search(self.name))
+
+    @property
     def is_other(self) -> bool:
-        """Whether the column says that it is no acceleration, by its name or its unit."""
+        """Whether the column says that it is no motion's acceleration, by its name or its unit."""
+        if self.is_spectral:
+            return True
         if self.unit and looks_like_unit(self.unit) and not is_unit(self.unit):
             return True
         named = _OTHER.search(self.name) and not _ACCELERATION.search(self.name)
@@ -256,6 +268,17 @@ def _bracketed(number: int, line: str) -> list[Said]:
             if not (_TIME.search(name) and not sure):
                 found.append(Said(inside, number, sure and not _OTHER.search(name)))
     return found
+
+
+def factors_said(path: Path, header: list[tuple[int, str]]) -> tuple[str, ...]:
+    """Notices of scale factors in a header: they may be applied already, and are not applied."""
+    found = [(number, m[1]) for number, line in header if (m := _FACTOR.search(line))]
+    return tuple(
+        f"File {path}, line {number}: its scale factor {text} was not applied to the samples; "
+        "scale them if it should be."
+        for number, text in found
+        if text.rstrip(".0").rstrip(",") != "1"
+    )
 
 
 def other_quantity(path: Path, line: int, kind: str) -> InputError:

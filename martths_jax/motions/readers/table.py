@@ -18,6 +18,7 @@ from .grammar import (
     Said,
     agreed_unit,
     column_cells,
+    factors_said,
     is_acceleration,
     other_quantity,
     says_value,
@@ -133,6 +134,8 @@ def _time(matrix: np.ndarray, titles: Titles, dt: float | None) -> int | None:
         if cell.is_time:
             return k
     k = time_column(matrix)
+    if k is None and matrix.shape[1] == 2 and not titles.cells and _mostly_goes_on(matrix[:, 0]):
+        return 0  # `uniform_step` says what is wrong with it
     if k is None or (titles.cells and titles.cells[k].is_counter):
         return None
     if dt is not None and dt != 1 and np.all(np.diff(matrix[:, k]) == 1):
@@ -140,6 +143,13 @@ def _time(matrix: np.ndarray, titles: Titles, dt: float | None) -> int | None:
     if titles.cells and (titles.cells[k].is_other or is_acceleration(titles.cells[k])):
         return None
     return k
+
+
+def _mostly_goes_on(values: np.ndarray) -> bool:
+    """Whether numbers rise or fall nearly throughout, as a damaged time does."""
+    with np.errstate(invalid="ignore"):
+        steps = np.diff(values)
+    return values.size > 10 and max(np.mean(steps > 0), np.mean(steps < 0)) > 0.9
 
 
 def _column(matrix, titles: Titles, time, variable, where, count) -> int | None:
@@ -157,8 +167,8 @@ def _column(matrix, titles: Titles, time, variable, where, count) -> int | None:
     counter = [k for k in range(columns) if _counts_rows(matrix[:, k]) and k != time]
     left = [k for k in range(columns) if k != time and k not in counter[:1]]
     wanted = [k for k in left if not (titles.cells and titles.cells[k].is_other)]
-    if titles.cells and not wanted and len(left) == 1:
-        return left[0]  # `_unit` says that it is no acceleration
+    if titles.cells and not wanted and left:
+        return left[-1]  # `_unit` says that it is no acceleration
     if len(wanted) == 1:
         return wanted[0]
     if time is None and not counter and not titles.cells and count != matrix.shape[0]:
@@ -209,14 +219,15 @@ def _unit(path, table: Table, titles: Titles, choice: int | None):
     line = titles.lines[-1] if titles.lines else 0
     single = len(titles.cells) == 1
     if cell.is_other and not (cell.unit is None and single):
-        if cell.unit is None or time_unit(cell.unit) is not None:
+        if cell.unit is None or cell.is_spectral or time_unit(cell.unit) is not None:
             raise other_quantity(path, line, cell.name or "time")
         own = [Said(cell.unit, line)]
     elif cell.unit is not None:
         text = dict(table.header).get(line, "")
         own = [Said(cell.unit, line, not single or surely_acceleration(cell.name, text))]
     free = [(n, text) for n, text in table.header if n not in titles.lines or (single and not own)]
-    return agreed_unit(path, own + units_said(path, free))
+    unit, notices = agreed_unit(path, own + units_said(path, free))
+    return unit, (*notices, *factors_said(path, table.header))
 
 
 def _time_factor(where: str, titles: Titles, time: int) -> float:
