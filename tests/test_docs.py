@@ -171,7 +171,7 @@ def test_options_in_the_text_exist(page):
     known = options(command_line()) | {"--help"}
     prose = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
     for code in re.findall(r"`([^`]+)`", prose):
-        for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", code):
+        for option in re.findall(r"(?<![\w=-])--[a-z][a-z-]*", code):
             assert option in known, code
 
 
