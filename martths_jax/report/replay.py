@@ -59,18 +59,19 @@ def replay(
         )
     keep = sorted({trial} | kept_trials(study))
     notices = _Listener(reporter)
-    engine = engine_again(RunFolder.open(folder), records, keep, notices)
+    run = RunFolder.open(folder)
+    engine = engine_again(run, records, keep, notices)
     if engine is None:
         raise InputError(notices.last.replace("No signals are stored, since the", "The"))
     differing = []
     names = study.dataset["index"].values
-    for controller, motion in RunFolder.open(folder).cells:
+    for controller, motion in run.cells:
         found = engine.run(controller, motion, np.array([trial])).value[0]
         stored = study.dataset.value.sel(controller=controller, motion=motion, trial=trial).values
         other = found.view(np.int64) != stored.astype(float).view(np.int64)
         other &= ~(np.isnan(found) & np.isnan(stored))
         differing += [(controller, motion, str(name)) for name in names[other]]
-    store_signals(engine, study.dataset, folder / "signals.nc", keep)
+    store_signals(engine, study.dataset, folder / "signals.nc", keep, run.digest)
     return Replay(open_study(folder), differing)
 
 

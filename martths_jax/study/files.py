@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from martths_jax.errors import InputError
-from martths_jax.files import atomic
+from martths_jax.files import atomic, refusal
 
 _REMEDIES = {
     errno.ENOSPC: "free some space and repeat the command: what is finished is kept",
@@ -34,10 +34,14 @@ def disk_errors(path: Path) -> Iterator[None]:
     """
     try:
         yield
-    except OSError as error:
-        # HDF5 wraps the system's error and keeps its number.
-        remedy = _REMEDIES.get(error.errno or 0, "see to it and repeat the command")
-        reason = error.strerror or str(error)
+    except InputError:
+        raise
+    except Exception as error:
+        refused = refusal(error)
+        if refused is None:
+            raise
+        remedy = _REMEDIES.get(refused.errno or 0, "see to it and repeat the command")
+        reason = refused.strerror or str(refused)
         raise InputError(f"{path} cannot be written ({reason}); {remedy}.") from error
 
 

@@ -15,6 +15,7 @@ from martths_jax.structure.frame import (
     N_FREE,
     assemble_stiffness,
     build_reference,
+    diaphragm_map,
     modes,
     rayleigh_coefficients,
 )
@@ -61,9 +62,13 @@ def test_stiffness_and_mass_meet_the_other_program(records):
 
 
 def test_supported_frame_has_no_mechanism():
+    """Its diaphragms hold the column line with two pins in the ground floor; nothing else does."""
     K = assemble_stiffness(FrameGeometry())
     np.testing.assert_allclose(K, K.T, atol=1e-6 * np.abs(K).max())
-    assert linalg.eigvalsh(K)[0] > 0
+    found = linalg.eigvalsh(K)
+    assert abs(found[0]) < 1e-12 * found[-1] and found[1] > 1e-6 * found[-1]
+    T = diaphragm_map()
+    assert linalg.eigvalsh(T.T @ K @ T)[0] > 1e-4 * found[-1]
 
 
 def test_released_column_carries_no_moment_at_its_pin():

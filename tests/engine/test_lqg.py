@@ -5,6 +5,8 @@ import pytest
 
 from martths_jax import LQG, InputError, nominal_plant, simulate
 from martths_jax.controllers.lqg import FITTED
+from martths_jax.study.config import StudyConfig
+from martths_jax.study.plan import build_controller
 from tests.engine.motions import burst
 
 
@@ -40,3 +42,14 @@ def test_an_error_that_does_not_exist(benchmark):
     wrong = LQG(bare.K_z, bare.K_e, bare.estimator, error="x_m")
     with pytest.raises(InputError, match=wanted):
         simulate(benchmark, wrong, nominal_plant(), burst(0.3))
+
+
+def test_a_study_names_the_weights_it_ran_with(benchmark):
+    """Those left out too: they identify its results."""
+    config = StudyConfig(controller={"lqg": {"error": "measured", "q": 1e-4}})
+    made, settings = build_controller("lqg", config, benchmark)
+    wanted = FITTED["measured"] | {"q": 1e-4}
+    assert made.error == settings["error"] == "measured"
+    assert {n: settings[n] for n in "eryq"} == {
+        n: list(w) if isinstance(w, tuple) else w for n, w in wanted.items()
+    }

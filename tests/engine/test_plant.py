@@ -105,7 +105,9 @@ def test_bad_draws(draws, message):
 
 
 def test_no_plants():
-    with pytest.raises(InputError, match="`n` must be a whole number of at least 1, but got 0"):
+    with pytest.raises(
+        InputError, match="`n` must be a whole number from 1 to 4294967295, but got 0"
+    ):
         draw_plants(0)
 
 

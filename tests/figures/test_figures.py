@@ -17,13 +17,14 @@ from martths_jax.figures import draw_figures, drawings, figure_list, open_source
 from martths_jax.figures.plants import FREQUENCY, spectral_delay
 from martths_jax.figures.structure import deformed
 from martths_jax.figures.style import DOUBLE, SINGLE
+from martths_jax.files import safe_name
 from martths_jax.plant import NOMINAL_HZ, frequency_response
 from martths_jax.structure.frame import build_reference, modes
 from martths_jax.structure.sections import FrameGeometry
 from tests.figures.small_study import MOTIONS, TRIALS
 
 NAMES = {
-    "fig08_strokes_elcentro-like", "strokes_short %26 %3Cquick%3E", "fig11_coefficients",
+    "fig08_strokes_elcentro-like", f"strokes_{safe_name(MOTIONS[1])}", "fig11_coefficients",
     "fig12_synchronisation_actuators", "fig13_synchronisation_interface", "fig14a_controllers",
     "fig14b_motions", "fig14b_motions_lqg", "fig15_histograms", "paired", "ecdf", "bode", "delay",
     "frame",

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from martths_jax.errors import InputError
 from martths_jax.motions import load_record
+from martths_jax.motions.timeaxis import uniform_step
 from martths_jax.motions.units import TO_SI
 
 from .records import Written, running, tables
@@ -90,3 +91,36 @@ def test_a_damaged_row_is_never_another_motion(one, data):
     # A line that is gone leaves no trace where there are no times.
     assert broken == "" and len(words) == 1, "a broken row was read"
     assert record.acceleration.size < one.acceleration.size
+
+
+@FEW
+@given(
+    st.integers(20, 1100),
+    st.integers(20, 600),
+    st.integers(2, 5),
+    st.floats(0, 5),
+    st.sampled_from([np.round, lambda t, d: np.floor(t * 10**d) / 10**d]),
+    st.data(),
+)
+def test_printed_times_say_their_step_or_are_refused(rate, samples, decimals, start, cut, data):
+    time = cut(start + np.arange(samples) / rate, decimals)
+    fine = 10.0**-decimals <= 0.49 / rate
+    try:
+        step, notices = uniform_step(time, "Times")
+    except InputError:
+        assert not fine
+        return
+    # Whole steps of the last digit are read as they stand, though a rate may round to them.
+    doubt = 1.001 * 10.0**-decimals / (samples - 1)
+    assert abs(step - 1 / rate) <= doubt
+    assert doubt <= 1.01e-3 * step or step == 1 / rate or notices or np.ptp(np.diff(time)) < 1e-9
+    gone = data.draw(st.integers(1, samples - 2))
+    with pytest.raises(InputError):
+        uniform_step(np.delete(time, gone), "Times")
+
+
+def test_a_gap_in_coarsely_printed_times_is_found():
+    time = np.round(1.43 + np.arange(58) / 339, 3)  # no time is further off the line than rounding
+    with pytest.raises(InputError, match="uniform step"):
+        uniform_step(np.delete(time, 29), "Times")
+    assert uniform_step(time, "Times")[0] == pytest.approx(1 / 339, rel=1e-2)

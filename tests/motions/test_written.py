@@ -133,7 +133,10 @@ def test_where_a_unit_may_stand(write, title):
     refused(["its unit is g"], write(title + "\n" + rows(WAVE)), dt=DT, units="cm/s2")
 
 
-@pytest.mark.parametrize("title", ["acc_V", "acc (N)", "Event (1/2/1999)", "PGA = 294.2 [cm/s2]"])
+@pytest.mark.parametrize(
+    "title",
+    ["acc_V", "acc (N)", "Event (1/2/1999)", "PGA = 294.2 [cm/s2]", "# Level 0.3 (g)\nWest wall"],
+)
 def test_what_is_no_unit(write, title):
     path = write(title + "\n" + rows(WAVE))
     refused(["does not say the unit"], path, dt=DT)

@@ -46,13 +46,13 @@ def numbers_of(line: str) -> list[float] | None:
     for match in _ITEM.finditer(line):
         start, item = match.start(), match[0]
         if start > end:
-            if line[end:start].strip(" \t,;"):
+            if line[end:start].strip():
                 return None
         elif values and not (item[0] in "+-" and "." in item and "." in before):
             return None
         values.append(to_float(item))
         end, before = match.end(), item
-    return None if line[end:].strip(" \t,;") else values
+    return None if line[end:].strip() else values
 
 
 def fixed_numbers(line: str, width: int) -> list[float] | None:
