@@ -94,7 +94,7 @@ def check_readme(names: dict, printed: str) -> None:
     step = 1e-4
     cost = jax.jit(names["cost"])
     slope = (float(cost(1 + step)) - float(cost(1 - step))) / (2 * step)
-    assert float(names["slope"](1.0)) == pytest.approx(slope, rel=1e-5)
+    assert float(names["slope"](1.0)) == pytest.approx(slope, rel=1e-7)
 
 
 def commands(page: Path, prose: bool = False) -> list[str]:
