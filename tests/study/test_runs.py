@@ -243,7 +243,7 @@ def test_diverging_trials_are_data(tmp_path):
     assert np.isnan(cell.value.values).all()
     assert np.isfinite(cell.first_stroke.values).any()
     assert np.isfinite(study.dataset.sel(motion="one").value.values).all()
-    assert "| passthrough | huge | 20 | 0 | 0 | 20 | 0 |" in study.summary().markdown()
+    assert "| passthrough | huge | 20 | 0 | 0 | 0 | 20 | 0 |" in study.summary().markdown()
 
 
 def test_signals_of_chosen_trials(tmp_path):
