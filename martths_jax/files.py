@@ -36,6 +36,19 @@ _YOUNG = 3600.0
 LONGEST_NAME = 200
 #: Names that are devices on Windows, whatever ending they have.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d) *(\.|$)", re.IGNORECASE)
+#: What to do about what the system refuses, by its number.
+REMEDIES = {
+    errno.ENOSPC: "free some space and repeat the command: what is finished is kept",
+    errno.EDQUOT: "your quota is full; free some space and repeat the command",
+    errno.EFBIG: "the file system or a limit refuses files of this size",
+    errno.EMFILE: "this process may open no more files; raise the limit (ulimit -n)",
+    errno.ENFILE: "this machine may open no more files; close other programs",
+    errno.EACCES: "give a folder you may write to",
+    errno.EPERM: "give a folder you may write to",
+    errno.EROFS: "give a folder on a disk that can be written to",
+    errno.ENOTDIR: "a part of the path is a file; give another folder",
+    errno.EEXIST: "a file stands where the folder should be; give another folder",
+}
 #: The system's words for no more room: disk, quota, size of a file, a disk that fails.
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 #: Kinds of characters that no name may have: controls, halves of characters, ends of lines.
@@ -59,9 +72,10 @@ def atomic(path: Path | str) -> Iterator[Path]:
         refused = refusal(error)
         if refused is None:
             raise
+        remedy = REMEDIES.get(refused.errno or 0, "choose another place or free some space")
         raise InputError(
-            f"Cannot write {path}: {refused.strerror or refused}; choose another place or free "
-            "some space, nothing that was there has been changed."
+            f"Cannot write {path}: {refused.strerror or refused}; {remedy}, nothing that was there "
+            "has been changed."
         ) from error
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import re
 from collections.abc import Iterator
@@ -11,18 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from martths_jax.errors import InputError
-from martths_jax.files import atomic, refusal
-
-_REMEDIES = {
-    errno.ENOSPC: "free some space and repeat the command: what is finished is kept",
-    errno.EDQUOT: "your quota is full; free some space and repeat the command",
-    errno.EFBIG: "the file system or a limit refuses files of this size",
-    errno.EACCES: "give --out (`out`) a folder you may write to",
-    errno.EPERM: "give --out (`out`) a folder you may write to",
-    errno.EROFS: "give --out (`out`) a folder on a disk that can be written to",
-    errno.ENOTDIR: "a part of the path is a file; give --out (`out`) another folder",
-    errno.EEXIST: "a file stands where the folder should be; give --out (`out`) another folder",
-}
+from martths_jax.files import REMEDIES, atomic, refusal
 
 
 @contextmanager
@@ -40,7 +28,7 @@ def disk_errors(path: Path) -> Iterator[None]:
         refused = refusal(error)
         if refused is None:
             raise
-        remedy = _REMEDIES.get(refused.errno or 0, "see to it and repeat the command")
+        remedy = REMEDIES.get(refused.errno or 0, "see to it and repeat the command")
         reason = refused.strerror or str(refused)
         raise InputError(f"{path} cannot be written ({reason}); {remedy}.") from error
 

@@ -76,7 +76,7 @@ def test_the_summary_says_what_it_should():
     summary = summarise(dataset())
     text = summary.markdown()
     tables = {t.title: t for t in summary.tables}
-    assert "| adfc | m | 50 | 49 | 0 | 1 | 0 | 1.000 |" in text
+    assert "| adfc | m | 50 | 49 | 0 | 0 | 1 | 0 | 1.000 |" in text
     rows = tables["adfc on m: 49 of 50 trials"].rows
     values = np.delete(np.arange(1, 51), 2)
     for row, percent in zip(rows[0][1:4], (5, 50, 95), strict=True):

