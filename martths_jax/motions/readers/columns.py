@@ -77,6 +77,15 @@ def pick(variable: str, names: list[str], where: str, what: str = "column") -> i
     )
 
 
+def pick_channel(variable: str | None, names: list[str], where: str) -> int:
+    """Index of the channel that `variable` picks, or of the only one there is."""
+    if variable is not None:
+        return pick(variable, names, where, "channel")
+    if len(names) > 1:
+        raise several(where, names, list(range(len(names))), "channels")
+    return 0
+
+
 def several(where: str, names: list[str], choices: list[int], what: str = "columns") -> InputError:
     """The error for more than one candidate and no `variable`."""
     listed = ", ".join(f"{k + 1} ({names[k]})" if names[k] else f"{k + 1}" for k in choices[:12])

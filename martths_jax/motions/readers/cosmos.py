@@ -11,6 +11,7 @@ on a line of its own how many values follow and in which format.
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +19,9 @@ import numpy as np
 from ...errors import InputError
 from ..checks import check_memory, check_stated_count, check_stated_peak
 from ..units import parse_unit
-from .columns import pick, several
+from .columns import pick_channel
 from .contents import Contents
-from .text import fixed_numbers, text_lines
+from .text import block_of_numbers, fixed_numbers, text_lines
 
 _FIRST = re.compile(r"^\s*\S.*\(format\s+v\s*[\d.]+", re.IGNORECASE)
 _REALS = re.compile(
@@ -55,13 +56,7 @@ def read_cosmos(path: Path, content: bytes, *, variable=None, dt=None) -> Conten
         first = max((start for start in starts if start < row), default=0)
         found = [m[1] for line in lines[first:row] if (m := _CHANNEL.search(line))]
         names.append(found[0] if found else "")
-    if len(blocks) == 1 and variable is None:
-        chosen = 0
-    elif variable is None:
-        raise several(f"File {path}", names, list(range(len(blocks))), "channels")
-    else:
-        chosen = pick(variable, names, f"File {path}", "channel")
-    row, block = blocks[chosen]
+    row, block = blocks[pick_channel(variable, names, f"File {path}")]
     first = max((start for start in starts if start < row), default=0)
     return _channel(path, lines, first, row, block)
 
@@ -78,14 +73,8 @@ def _channel(path: Path, lines: list[str], first: int, row: int, block: re.Match
             f"{where}: its time step (the 62nd real of the header) is {reals[61]:g} ms, but a "
             "positive one is wanted; download the file again."
         )
-    values: list[float] = []
-    places: list[int] = []
-    for number, line in enumerate(lines[row + 1 :], row + 2):
-        found = fixed_numbers(line, int(block[3]))
-        if not found or len(values) >= count:
-            break
-        values += found
-        places += [number] * len(found)
+    columns = partial(fixed_numbers, width=int(block[3]))
+    values, places = block_of_numbers(lines, row + 1, columns, count)
     check_stated_count(len(values), count, where, "the number of points")
     if reals[62] != _UNKNOWN and abs(reals[62] / step - count) > 2:
         raise InputError(

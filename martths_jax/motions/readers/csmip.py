@@ -11,6 +11,7 @@ Report OSMS 85-03.
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +19,10 @@ import numpy as np
 from ...errors import InputError
 from ..checks import check_memory, check_stated_count, check_stated_peak
 from ..units import parse_unit
-from .columns import pick, several
+from .columns import pick_channel
 from .contents import Contents
 from .grammar import first_unit
-from .text import NUMBER, fixed_numbers, numbers_of, text_lines
+from .text import NUMBER, block_of_numbers, fixed_numbers, numbers_of, text_lines
 
 _BLOCK = re.compile(
     rf"^\s*(\d+)\s+points\s+of\s+accel\w*\s+data\s+equally\s+spaced\s+at\s*({NUMBER.pattern})\s*"
@@ -49,12 +50,7 @@ def read_csmip(path: Path, content: bytes, *, variable=None, dt=None) -> Content
         )
     names = [_above(lines, row, _CHANNEL) for row, _ in blocks]
     names = [found[2].strip() if found else "" for found in names]
-    if len(blocks) == 1 and variable is None:
-        chosen = 0
-    elif variable is None:
-        raise several(f"File {path}", names, list(range(len(blocks))), "channels")
-    else:
-        chosen = pick(variable, names, f"File {path}", "channel")
+    chosen = pick_channel(variable, names, f"File {path}")
     return _channel(path, lines, *blocks[chosen])
 
 
@@ -75,14 +71,8 @@ def _channel(path: Path, lines: list[str], row: int, block: re.Match) -> Content
     unit = parse_unit(unit, f"{where},") if unit else None
     if not (count >= 2 and step > 0):
         raise InputError(f"{where}: found {count} points at {step:g} s; download the file again.")
-    values: list[float] = []
-    places: list[int] = []
-    for number, line in enumerate(lines[row + 1 :], row + 2):
-        found = fixed_numbers(line, int(block[5])) if block[5] else numbers_of(line)
-        if not found or len(values) >= count:
-            break
-        values += found
-        places += [number] * len(found)
+    columns = partial(fixed_numbers, width=int(block[5])) if block[5] else numbers_of
+    values, places = block_of_numbers(lines, row + 1, columns, count)
     check_stated_count(len(values), count, where, "the number of points")
     if peak and unit and parse_unit(peak[2], f"File {path}, peak acceleration") == unit:
         check_stated_peak(np.array(values), float(peak[1]), where)

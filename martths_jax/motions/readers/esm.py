@@ -17,7 +17,7 @@ from ..units import TO_SI, parse_unit
 from .contents import Contents
 from .grammar import other_quantity
 from .steps import header_step
-from .text import NUMBER, numbers_of, text_lines
+from .text import NUMBER, numbers_below, numbers_of, text_lines
 
 _ENTRY = re.compile(r"([A-Z][A-Z0-9_/^]*)\s*:\s*(.*)")
 
@@ -52,17 +52,8 @@ def read_esm(path: Path, content: bytes, *, variable=None, dt=None) -> Contents:
     for number, text in _get(entries, "UNITS"):
         unit = parse_unit(text, f"File {path}, line {number},")
     check_memory(float(counts[0][0]), f"File {path}, NDATA")
-    values: list[float] = []
-    places: list[int] = []
-    for number, line in enumerate(lines[first:], first + 1):
-        found = numbers_of(line)
-        if found is None or len(found) > 1:
-            raise InputError(
-                f"File {path}, line {number}: found {line.strip()[:40]!r}, but one number a line "
-                "is wanted below the header; download the file again."
-            )
-        values += found
-        places += [number] * len(found)
+    wanted = "one number a line is wanted below the header"
+    values, places = numbers_below(path, lines, first, _one_number, wanted)
     check_stated_count(len(values), int(float(counts[0][0])), f"File {path}", "NDATA")
     for _, text in _get(entries, "PGA_CM/S^2"):
         if unit and NUMBER.fullmatch(text):
@@ -74,3 +65,9 @@ def read_esm(path: Path, content: bytes, *, variable=None, dt=None) -> Contents:
 def _get(entries: dict, name: str) -> list[tuple[int, str]]:
     """An entry and its line, in a list that is empty where it has no value."""
     return [entries[name]] if entries.get(name, (0, ""))[1] else []
+
+
+def _one_number(line: str) -> list[float] | None:
+    """The number of a line, none if it is empty, None if it holds more."""
+    found = numbers_of(line)
+    return None if found is None or len(found) > 1 else found

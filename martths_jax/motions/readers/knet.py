@@ -16,7 +16,7 @@ from ...errors import InputError
 from ..checks import check_memory, check_stated_count, check_stated_peak
 from ..units import parse_unit
 from .contents import Contents
-from .text import NUMBER, numbers_of, text_lines
+from .text import NUMBER, numbers_below, text_lines
 
 _HEADER_LINES = 17
 _SCALE = re.compile(rf"({NUMBER.pattern})\s*\((\w+)\)\s*/\s*({NUMBER.pattern})")
@@ -41,17 +41,7 @@ def read_knet(path: Path, content: bytes, *, variable=None, dt=None) -> Contents
     check_memory(len(content) / 2, f"File {path}")
     unit = parse_unit(scale[2], f"File {path}, scale factor,")
     first = next(k for k, line in enumerate(lines) if line.startswith("Memo")) + 1
-    values: list[float] = []
-    places: list[int] = []
-    for number, line in enumerate(lines[first:], first + 1):
-        found = numbers_of(line)
-        if found is None:
-            raise InputError(
-                f"File {path}, line {number}: found {line.strip()[:40]!r}, but only numbers may "
-                "follow the header; download the file again."
-            )
-        values += found
-        places += [number] * len(found)
+    values, places = numbers_below(path, lines, first)
     seconds = NUMBER.search(_value(path, lines, "Duration Time"))
     if seconds:
         stated = round(float(seconds[0]) * float(rate[0]))

@@ -18,7 +18,7 @@ from ..checks import check_memory, check_stated_count
 from .contents import Contents
 from .grammar import agreed_unit, units_said
 from .steps import header_count, header_step
-from .text import numbers_of, text_lines
+from .text import numbers_below, text_lines
 
 _HEADER_LINES = 12
 _DT = re.compile(r"\bDT\b", re.IGNORECASE)
@@ -43,19 +43,7 @@ def read_at2(path: Path, content: bytes, *, variable=None, dt=None) -> Contents:
     header = list(enumerate(lines[: row + 1], 1))
     unit, notices = agreed_unit(path, units_said(path, header))
     check_memory(count, f"File {path}, line {row + 1}")
-    values: list[float] = []
-    places: list[int] = []
-    for number, line in enumerate(lines[row + 1 :], row + 2):
-        found = numbers_of(line)
-        if found is None and len(values) == count:
-            continue
-        if found is None:
-            raise InputError(
-                f"File {path}, line {number}: found {line.strip()[:40]!r}, but only numbers may "
-                "follow the header; download the file again."
-            )
-        values.extend(found)
-        places.extend([number] * len(found))
+    values, places = numbers_below(path, lines, row + 1, count=count)
     check_stated_count(len(values), count, f"File {path}, line {row + 1}")
     return Contents(np.array(values), step, unit, f"File {path}", places, notices)
 

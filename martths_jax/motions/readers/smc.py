@@ -9,6 +9,7 @@ comments, the 17th the samples; the 2nd real is the sampling rate [Hz], the 30th
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from ...errors import InputError
 from ..checks import check_memory, check_stated_count, check_stated_peak
 from .contents import Contents
 from .grammar import other_quantity
-from .text import fixed_numbers, text_lines
+from .text import fixed_numbers, numbers_below, text_lines
 
 _TEXT, _INTEGERS, _REALS = 11, 6, 10
 _FIRST = re.compile(
@@ -50,19 +51,8 @@ def read_smc(path: Path, content: bytes, *, variable=None, dt=None) -> Contents:
         )
     check_memory(count, f"File {path}, line 14")
     start = _TEXT + _INTEGERS + _REALS + int(comments)
-    values: list[float] = []
-    places: list[int] = []
-    for number, line in enumerate(lines[start:], start + 1):
-        if not line.strip():
-            continue
-        found = fixed_numbers(line, 10)
-        if found is None:
-            raise InputError(
-                f"File {path}, line {number}: found {line.strip()[:40]!r}, but only numbers may "
-                "follow the comments; download the file again."
-            )
-        values += found
-        places += [number] * len(found)
+    columns, wanted = partial(fixed_numbers, width=10), "only numbers may follow the comments"
+    values, places = numbers_below(path, lines, start, columns, wanted)
     check_stated_count(len(values), int(count), f"File {path}, line 14", "the number of samples")
     stated = [reals[k] for k in (29, 31) if reals[k] != reals[0]]
     if stated:

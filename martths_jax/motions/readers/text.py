@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 from ...errors import InputError
@@ -61,3 +62,59 @@ def fixed_numbers(line: str, width: int) -> list[float] | None:
     if not all(NUMBER.fullmatch(field) for field in fields):
         return None
     return [to_float(field) for field in fields]
+
+
+def numbers_below(
+    path: Path,
+    lines: list[str],
+    start: int,
+    parse: Callable[[str], list[float] | None] = numbers_of,
+    wanted: str = "only numbers may follow the header",
+    count: int | None = None,
+) -> tuple[list[float], list[int]]:
+    """All numbers from a line on, and the number of the line of each.
+
+    Args:
+        path: for errors.
+        lines: of the whole file.
+        start: index of the first line of numbers.
+        parse: gives the numbers of a line, None if it holds more.
+        wanted: what an error says of such a line.
+        count: numbers after which lines of another kind may follow.
+
+    Raises:
+        InputError: naming the first line that cannot be parsed.
+    """
+    values: list[float] = []
+    places: list[int] = []
+    for number, line in enumerate(lines[start:], start + 1):
+        found = parse(line)
+        if found is None and len(values) == count:
+            continue
+        if found is None:
+            raise InputError(
+                f"File {path}, line {number}: found {line.strip()[:40]!r}, but {wanted}; download "
+                "the file again."
+            )
+        values += found
+        places += [number] * len(found)
+    return values, places
+
+
+def block_of_numbers(
+    lines: list[str], start: int, parse: Callable[[str], list[float] | None], count: int
+) -> tuple[list[float], list[int]]:
+    """Numbers from a line on, up to a line of another kind or until `count` are there.
+
+    Returns:
+        the numbers, and the number of the line of each.
+    """
+    values: list[float] = []
+    places: list[int] = []
+    for number, line in enumerate(lines[start:], start + 1):
+        found = parse(line)
+        if not found or len(values) >= count:
+            break
+        values += found
+        places += [number] * len(found)
+    return values, places
