@@ -45,6 +45,15 @@ def try_lock(descriptor: int) -> bool | None:
     return True
 
 
+def is_open_at(descriptor: int, path: Path) -> bool:
+    """Whether an open file is still the one under its name."""
+    try:
+        there, mine = os.stat(path), os.fstat(descriptor)
+    except OSError:
+        return False
+    return (there.st_ino, there.st_dev) == (mine.st_ino, mine.st_dev)
+
+
 @lru_cache(maxsize=1)
 def _boot() -> str:
     """What tells this start of this machine from others, also from inside a container."""
@@ -116,11 +125,7 @@ class Claim:
 
     def stands(self) -> bool:
         """Whether the file is still there and still this process's own."""
-        try:
-            there, mine = os.stat(self.path), os.fstat(self.descriptor)
-        except OSError:
-            return False
-        return (there.st_ino, there.st_dev) == (mine.st_ino, mine.st_dev)
+        return is_open_at(self.descriptor, self.path)
 
     def release(self) -> None:
         """Give it up and delete the file, if it is still this process's own."""

@@ -92,7 +92,7 @@ def scratch(path: Path) -> Iterator[Path]:
         return
     place = run / PRIVATE / "tmp" / unique_name()
     sweep(run)
-    place.mkdir(parents=True)
+    make_folder(place)
     claim = Claim(place / "claim")
     try:
         yield place / f"part{path.suffix}"
@@ -125,6 +125,19 @@ def sweep(run: Path) -> None:
             if not held:
                 shutil.rmtree(left, ignore_errors=True)
         remove_empty(place)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a private folder if it is missing, while others remove empty ones above it.
+
+    Raises:
+        OSError: if it cannot be made.
+    """
+    for _ in range(100):
+        # Gone between two looks at it, one above it or itself: what stays in the way is told below.
+        with contextlib.suppress(FileNotFoundError, FileExistsError):
+            return folder.mkdir(parents=True, exist_ok=True)
+    return folder.mkdir(parents=True, exist_ok=True)
 
 
 def remove_empty(*folders: Path) -> None:

@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from martths_jax.claims import Claim, holder, try_lock, unique_name
+from martths_jax.claims import Claim, holder, is_open_at, try_lock, unique_name
 from martths_jax.errors import InputError
-from martths_jax.files import PRIVATE, remove_empty, sweep
+from martths_jax.files import PRIVATE, make_folder, remove_empty, sweep
 from martths_jax.study.files import disk_errors
 
 #: Longest time to wait at the door, which nobody holds longer than it takes to write a file [s].
@@ -33,9 +33,12 @@ def door(folder: Path) -> Iterator[None]:
     path = folder / PRIVATE / "door"
     deadline = time.monotonic() + PATIENCE
     while True:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        if try_lock(descriptor) is not False and _same(path, descriptor):
+        make_folder(path.parent)
+        try:
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        except FileNotFoundError:  # whoever left just now took the folder along
+            continue
+        if try_lock(descriptor) is not False and is_open_at(descriptor, path):
             break
         os.close(descriptor)
         if time.monotonic() > deadline:
@@ -54,16 +57,6 @@ def door(folder: Path) -> Iterator[None]:
         remove_empty(path.parent)
 
 
-def _same(path: Path, descriptor: int) -> bool:
-    """Whether an open file is still the one under its name."""
-    try:
-        there = path.stat()
-    except OSError:
-        return False
-    mine = os.fstat(descriptor)
-    return (there.st_ino, there.st_dev) == (mine.st_ino, mine.st_dev)
-
-
 class Owner:
     """A process's right to write into a run's folder; made inside its ``door``.
 
@@ -77,7 +70,7 @@ class Owner:
     """
 
     def __init__(self, folder: Path, shared: bool, command: str):
-        self.folder, self.shared = folder, shared
+        self.folder = folder
         place = folder / PRIVATE / "owners"
         others = owners(folder)
         for other in others:
@@ -140,7 +133,7 @@ def owners(folder: Path) -> list[dict]:
     for path in list(place.iterdir()) if place.is_dir() else ():
         about = holder(path)
         if about is not None:
-            found.append(about | {"file": str(path)})
+            found.append(about)
         else:
             path.unlink(missing_ok=True)
     return found

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -129,6 +130,25 @@ def test_a_door_that_nobody_leaves(tmp_path, monkeypatch):
     with door(tmp_path), pytest.raises(InputError, match="being changed by another process"):
         with door(tmp_path):
             pass
+
+
+def test_many_come_and_go_at_once(tmp_path):
+    """Whoever leaves takes empty folders along, which must not trip who comes just then."""
+    (tmp_path / "run.json").write_text("{}")
+
+    def come_and_go(number):
+        for i in range(100):
+            with door(tmp_path):
+                pass
+            with atomic(tmp_path / f"{number}.txt") as part:
+                part.write_text(str(i))
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(come_and_go, range(4)))
+    with door(tmp_path):  # whoever leaves last, with nobody writing, takes all along
+        pass
+    left = sorted(p.name for p in tmp_path.iterdir())
+    assert left == ["0.txt", "1.txt", "2.txt", "3.txt", "run.json"]
 
 
 @pytest.mark.parametrize(
