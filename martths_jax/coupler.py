@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from martths_jax.errors import argument_error
+from martths_jax.errors import argument_error, as_numbers
 from martths_jax.once import once
 from martths_jax.runtime import check_precision
 
@@ -52,10 +52,7 @@ def build_coupler(
     ):
         if isinstance(value, jax.core.Tracer):
             continue
-        try:
-            number = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
-            number = np.array(np.nan)
+        number = as_numbers(value)
         if number.ndim or not 0 < number < most:
             raise argument_error(name, wanted, repr(value)[:80])
     traced = isinstance(alpha_deg, jax.core.Tracer)

@@ -6,6 +6,7 @@ import operator
 from collections.abc import Iterable
 
 import jax
+import numpy as np
 
 
 class InputError(ValueError):
@@ -20,6 +21,14 @@ def argument_error(name: str, wanted: str, got: object, remedy: str = "") -> Inp
     """``InputError`` of the form "Argument `name` must <wanted>, but got <got>.  <remedy>"."""
     sentence = f"Argument `{name}` must {wanted}, but got {got}."
     return InputError(f"{sentence} {remedy}" if remedy else sentence)
+
+
+def as_numbers(value) -> np.ndarray:
+    """An argument as float64, NaN where it is none: a check then refuses it like any other."""
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return np.array(np.nan)
 
 
 def check_whole(name: str, value, least: int, most: int) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy import linalg
 
 from martths_jax.design.riccati import dense_kalman_gain
-from martths_jax.errors import argument_error
+from martths_jax.errors import argument_error, as_numbers
 from martths_jax.runtime import check_precision
 from martths_jax.structure.modal import ModalSystem, advance, output, spread, to_dense
 
@@ -107,10 +107,7 @@ def design_kalman(model: ModalSystem, q, r: float) -> KalmanFilter:
         gain = lambda one: dense_kalman_gain(A, B, C, one, r)  # noqa: E731
         return KalmanFilter(model, jax.vmap(gain, out_axes=-1)(q) if q.ndim else gain(q))
     for name, value, most_axes in (("q", q, 1), ("r", r, 0)):
-        try:
-            number = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
-            number = np.array(np.nan)
+        number = as_numbers(value)
         if number.ndim > most_axes or not np.all(np.isfinite(number) & (number > 0)):
             raise argument_error(name, "be positive and finite (mm^2)", repr(value)[:80])
     gains = {one: _slots(A, B, C, one, r) for one in np.unique(np.asarray(q, dtype=float))}

@@ -14,7 +14,7 @@ from scipy import linalg
 from martths_jax.benchmark import Benchmark
 from martths_jax.controllers.base import Controller, Decision
 from martths_jax.design.closed_loop import lowest_stable_rate, nominal_radius
-from martths_jax.errors import argument_error
+from martths_jax.errors import argument_error, as_numbers
 from martths_jax.kalman import design_kalman
 from martths_jax.runtime import check_runtime
 from martths_jax.structure.modal import contract
@@ -165,10 +165,7 @@ def check_weights(e, r, y, q) -> None:
                 name, wanted, "a traced value",
                 "martths_jax.design.lqg.lqg_from_weights can be traced and differentiated.",
             )  # fmt: skip
-        try:
-            values = np.asarray(given, dtype=float)
-        except (TypeError, ValueError):
-            values = np.array(np.nan)
+        values = as_numbers(given)
         if values.shape != shape or not np.all(np.isfinite(values) & (values > low)):
             raise argument_error(name, wanted, repr(given)[:80])
 

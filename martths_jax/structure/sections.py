@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from martths_jax.errors import argument_error
+from martths_jax.errors import argument_error, as_numbers
 
 INCH = 0.0254  # m
 KSI = 6.894757293168361e6  # Pa
@@ -22,10 +22,7 @@ def check_positive(name: str, given, unit: str, shape: tuple = (), zero: bool = 
     Raises:
         InputError: naming the argument.
     """
-    try:
-        values = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        values = np.array(np.nan)
+    values = as_numbers(given)
     good = values.shape == shape and np.all(np.isfinite(values) & (values >= 0))
     if not good or not (zero or np.all(values > 0)):
         counted = f"{' x '.join(map(str, shape))} numbers" if shape else "a number"

@@ -1,4 +1,4 @@
-"""A result file that knows its own content: no bit of it changes without a word.
+"""Checksums: results and headers that know their own content, so that no bit changes unsaid.
 
 HDF5 checks nothing by default, and its own checksums cover arrays only.  Here a digest over every
 name, dimension, type, value and attribute stands in the file as an attribute, so it travels along.
@@ -7,12 +7,18 @@ name, dimension, type, value and attribute stands in the file as an attribute, s
 from __future__ import annotations
 
 import hashlib
+import json
 
 import numpy as np
 import xarray as xr
 
-#: The attribute that holds it.
+#: The attribute that holds ``content_digest``.
 CHECKSUM = "content_sha256"
+
+
+def json_digest(content) -> str:
+    """SHA-256 of what JSON can hold, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def content_digest(dataset: xr.Dataset) -> str:

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from martths_jax.errors import InputError
-from martths_jax.study import provenance
+from martths_jax.study.checksum import json_digest
 from martths_jax.study.parts import Damaged
 
 #: Version of the layout of a run's folder.
@@ -16,7 +16,7 @@ FOLDER_FORMAT = 2
 def sealed(header: dict) -> dict:
     """A header with the checksum of everything else in it."""
     plain = {k: v for k, v in header.items() if k != "sha256"}
-    return plain | {"sha256": provenance.digest(plain)}
+    return plain | {"sha256": json_digest(plain)}
 
 
 def read_header(file: Path, what: str) -> dict:

@@ -7,8 +7,6 @@ numbers are as right, but they are others.  Bits are the same between two machin
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import re
 from functools import lru_cache
@@ -17,6 +15,7 @@ import jax
 import jax.numpy as jnp
 
 from martths_jax.runtime import compiler_options
+from martths_jax.study.checksum import json_digest
 
 #: Flags that change how a run goes, not what it computes.
 _NO_NUMBERS = re.compile(
@@ -44,7 +43,7 @@ def machine_identity() -> dict[str, str]:
 
 def machine_digest() -> str:
     """``machine_identity`` in short."""
-    return hashlib.sha256(json.dumps(machine_identity(), sort_keys=True).encode()).hexdigest()[:16]
+    return json_digest(machine_identity())[:16]
 
 
 def flags_that_count(flags: str) -> list[str]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
-import json
 import platform
 import shlex
 import subprocess
@@ -110,11 +108,6 @@ def identity(plan: Plan) -> dict:
     found["precision"] = str(np.dtype(jnp.zeros(()).dtype))
     found["code"] = engine_code()
     return found
-
-
-def digest(identity) -> str:
-    """SHA-256 of what JSON can hold."""
-    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
 
 def differences(stored: dict, asked: dict, prefix: str = "") -> list[str]:

@@ -159,7 +159,6 @@ class Session:
         }
         self.about["process"] = os.getpid()
         self.about["session"] = secrets.token_hex(4)  # hosts may share process numbers
-        self.name = {k: self.about[k] for k in ("started", "host", "process", "session")}
         self.compiled = compile_seconds()
 
     def save(self) -> None:
@@ -172,10 +171,10 @@ class Session:
         if self.run.owner is not None and not self.run.owner.claim.stands():
             return  # the folder is gone, or another run's
         path = self.run.path / "provenance.json"
-        same = lambda s: all(s.get(k) == v for k, v in self.name.items())  # noqa: E731
         with disk_errors(path), door(self.run.path):  # processes of one study end at the same time
             sessions = read_provenance(self.run.path, aside=True)["sessions"]
-            sessions = [s for s in sessions if not same(s)] + [self.about]
+            mine = self.about["session"]
+            sessions = [s for s in sessions if s.get("session") != mine] + [self.about]
             write_text(path, json.dumps({"sessions": sessions}, indent=1))
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from martths_jax.errors import InputError, raise_all
 from martths_jax.files import safe_name
-from martths_jax.study import provenance
+from martths_jax.study.checksum import json_digest
 from martths_jax.study.engine import Outcome
 from martths_jax.study.files import set_aside, write_bytes
 from martths_jax.study.machine import machine_digest
@@ -43,12 +44,10 @@ class Stored:
         identity = self.header["identity"]
         return [(c, m) for m in identity["motions"] for c in identity["controllers"]]
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """Digest of what decides the numbers."""
-        if "_known" not in vars(self):
-            self._known = provenance.digest(self.header["identity"])
-        return self._known
+        return json_digest(self.header["identity"])
 
     def folder(self, controller: str, motion: str) -> Path:
         """Where the parts of a controller and motion are."""

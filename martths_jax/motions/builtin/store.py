@@ -7,17 +7,18 @@ them (``made.json``): another machine may round other samples up, so these hold 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import json
-import os
-import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from martths_jax.errors import InputError
+from martths_jax.files import atomic
 from martths_jax.runtime import cache_folder
 
 from .. import measures, spectra
@@ -114,13 +115,5 @@ def _is_known(name: str, facts: Facts, values: np.ndarray) -> bool:
 
 
 def _keep(path: Path, name: str, values: np.ndarray) -> None:
-    part = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
-            part = file.name
-            file.write(_packed(name, values))
-        os.replace(part, path)
-    except OSError:
-        if part is not None:
-            Path(part).unlink(missing_ok=True)
+    with contextlib.suppress(InputError), atomic(path) as part:
+        part.write_bytes(_packed(name, values))
