@@ -11,7 +11,14 @@ print(indices(result)["J2_1"].mean())
 from martths_jax import runtime  # first: float64 and the devices are set before JAX starts
 from martths_jax._version import __version__
 from martths_jax.benchmark import Benchmark, build_benchmark
-from martths_jax.controllers import ADFC, LQG, Controller, Decision, Observation, Passthrough
+from martths_jax.control.controllers import (
+    ADFC,
+    LQG,
+    Controller,
+    Decision,
+    Observation,
+    Passthrough,
+)
 from martths_jax.coupler import Coupler, build_coupler
 from martths_jax.errors import InputError
 from martths_jax.indices import indices

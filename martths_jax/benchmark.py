@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from martths_jax.control.base import Estimator
 from martths_jax.coupler import Coupler, build_coupler
 from martths_jax.errors import argument_error
 from martths_jax.plant import (
@@ -35,6 +37,8 @@ from martths_jax.structure.sections import check_positive
 from martths_jax.structure.statespace import discretise
 
 PARTITIONS = ("benchmark", "consistent")
+#: Strokes that the restoring force can be made from, beside those of a filter of one's own.
+FORCE_FROM = ("estimate", "measurement")
 #: Volts of the two valves: u [mm] / gain + offset (only monitored), and their limit.
 VOLT_PER_MM = np.array([1 / (7.4921 * 1.053), 1 / (7.3907 * 1.055)])
 VOLT_OFFSET = np.array([-0.0092 / 7.4921, 0.0059 / 7.3907])
@@ -55,6 +59,9 @@ class Benchmark:
         plant_model: the plant that controllers and filters are designed for, discretised.
         plant_continuous: (A, B, C) of that plant, states slot by slot.
         noise_power: power of the sensor noise that filters are designed for [mm^2 s].
+        force_filter: the force path's own ``Estimator``, where `force_from` is ``filter``.
+        force_from: strokes that the restoring force is made from: the controller's ``estimate``,
+            the ``measurement`` or those of the own ``filter``.
         integrator, partition: names of the methods used.
     """
 
@@ -66,6 +73,8 @@ class Benchmark:
     plant_model: ModalSystem
     plant_continuous: tuple
     noise_power: float
+    force_filter: Any = None
+    force_from: str = field(default="estimate", metadata={"static": True})
     integrator: str = field(default="newmark", metadata={"static": True})
     partition: str = field(default="benchmark", metadata={"static": True})
 
@@ -89,6 +98,7 @@ def build_benchmark(
     coupler: Coupler | None = None,
     quirks: Quirks | None = None,
     plant: Plants | None = None,
+    force_from: str | Estimator = "estimate",
     tolerance: float | None = None,
 ) -> Benchmark:
     """Build the v-maRTHS benchmark (Condori Uribe et al. 2023).
@@ -105,6 +115,10 @@ def build_benchmark(
         plant: one plant, from ``plant_from_hz``, which filters, LQG and ADFC's anchor are designed
             for; the benchmark's nominal plant by default.  ``simulate`` is given the plants that
             run, such as ``draw_plants(1000, around=plant)``.
+        force_from: what the force of the experimental frame is made from, and so what ``x_hat`` and
+            ``est`` are in the results: the strokes that the controller's estimator gives
+            (``estimate``, as the published loop does), those measured (``measurement``), or those
+            of an estimator of the force path's own, such as ``design_kalman(...)``.
         tolerance: of the order reduction of the structures, see ``statespace.discretise``.
 
     Raises:
@@ -114,6 +128,7 @@ def build_benchmark(
     plant = nominal_plant() if plant is None else one_plant("plant", plant)
     _check_arguments(fs, integrator, partition, geometry, coupler, quirks, tolerance)
     _check_rate(fs, plant)
+    own = _own_filter(force_from)
     dt = 1.0 / fs
     method = INTEGRATORS[integrator]
     reference = build_reference(geometry)
@@ -140,6 +155,8 @@ def build_benchmark(
         plant_model=plant.discretise(dt),
         plant_continuous=continuous_plant(plant),
         noise_power=SensorNoise().power,
+        force_filter=own,
+        force_from=force_from if own is None else "filter",
         integrator=integrator,
         partition=partition,
     )
@@ -172,6 +189,17 @@ def _check_arguments(fs, integrator, partition, geometry, coupler, quirks, toler
             )  # fmt: skip
     if tolerance is not None:
         check_positive("tolerance", tolerance, "1")
+
+
+def _own_filter(force_from) -> Estimator | None:
+    """The force path's own estimator, if `force_from` is one."""
+    if isinstance(force_from, Estimator):
+        return force_from
+    if force_from not in FORCE_FROM:
+        raise argument_error(
+            "force_from", f"be one of {list(FORCE_FROM)} or an Estimator", repr(force_from)[:80]
+        )
+    return None
 
 
 def _check_rate(fs: float, plant: Plants) -> None:

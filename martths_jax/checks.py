@@ -8,8 +8,8 @@ import jax
 import numpy as np
 
 from martths_jax.benchmark import Benchmark
-from martths_jax.controllers import Controller
-from martths_jax.controllers.inverse import BAND_HZ
+from martths_jax.control.adaptive.inverse import BAND_HZ
+from martths_jax.control.controllers import Controller
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import Motion
 from martths_jax.plant import IdealPlants, Plants, frequency_response

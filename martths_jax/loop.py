@@ -15,10 +15,11 @@ import jax.numpy as jnp
 
 from martths_jax import watch as watching
 from martths_jax.benchmark import Benchmark
-from martths_jax.controllers import Controller, Observation
+from martths_jax.control.base import Controller
+from martths_jax.control.compensator import Compensator, CompensatorState
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
 from martths_jax.indices import IndexSums, blank_sums, correlate, pairs
-from martths_jax.once import computed, once
+from martths_jax.once import once
 from martths_jax.structure.modal import ModalSystem, advance, contract, output
 
 #: Length of the time loop's windows for controllers that keep none [samples].
@@ -35,61 +36,61 @@ class LoopState:
     Attributes:
         structure: (2, n, T) state of the numerical substructure.
         plant: (2, m, T) state of the plants.
-        filter: state of the estimator, predicted for k.
-        interface: (2, 2, T) estimated interface motion at k-1 and k-2.
-        controller: state of the controller.
+        compensator: state of estimator and controller.
+        force_path: prediction of the force path's own filter for k; None without one.
+        interface: (2, 2, T) interface motion that the force was made from at k-1 and k-2.
     """
 
     structure: jax.Array
     plant: jax.Array
-    filter: jax.Array
+    compensator: CompensatorState
+    force_path: Any
     interface: jax.Array
-    controller: Any
 
 
 def initial_state(
-    benchmark: Benchmark, controller: Controller, plant: ModalSystem, trials: int
+    benchmark: Benchmark, compensator: Compensator, plant: ModalSystem, trials: int
 ) -> LoopState:
     """Everything at rest."""
     at_rest = lambda system: jnp.zeros(system.a.shape[:2] + (trials,))  # noqa: E731
+    own = benchmark.force_filter
     return LoopState(
         structure=at_rest(benchmark.numerical),
         plant=at_rest(plant),
-        filter=controller.estimator.init(trials),
+        compensator=compensator.init_served(trials),
+        force_path=None if own is None else own.init(trials),
         interface=jnp.zeros((2, 2, trials)),
-        controller=controller.init(trials),
     )
 
 
 def sample_period(
     benchmark: Benchmark,
-    controller: Controller,
+    compensator: Compensator,
     plant: ModalSystem,
     state: LoopState,
-    k: jax.Array,
     ground: jax.Array,
     noise: jax.Array,
     delayed: Any,
 ) -> tuple[LoopState, dict[str, jax.Array], Any]:
-    """Advance a batch of trials by one sample.
+    """Advance a batch of trials by one sample k.
 
     Args:
-        k: number of the sample.
         ground: ground acceleration at k [m/s^2], a scalar.
         noise: (1 or 2, T or 1) sensor noise at k [mm].
-        delayed: the controller's record of ``window`` samples ago.
+        delayed: what comes out of the controller's delay line.
 
     Returns:
-        state at k + 1, signals at k, the controller's record.
+        state at k + 1, signals at k, the record that goes into the delay line.
     """
     # What the sensors and the filter know of the strokes at k.
     measured = output(plant, state.plant) + noise
-    corrected, estimate = controller.estimator.correct(state.filter, measured)
+    observed, estimate = compensator.observe(state.compensator, measured)
+    known, felt = felt_strokes(benchmark, state.force_path, measured, estimate)
 
-    # Estimated interface motion and the force of the experimental frame; its velocity and
+    # Interface motion of those strokes and the force of the experimental frame; its velocity and
     # acceleration are backward differences, zero at the first sample.
-    interface = actuator_to_frame(benchmark.coupler, estimate)
-    before = jnp.where(k == 0, interface, state.interface)
+    interface = actuator_to_frame(benchmark.coupler, felt)
+    before = jnp.where(state.compensator.k == 0, interface, state.interface)
     force = restoring_force(benchmark.restoring, interface, before)
 
     # Numerical substructure under its own inertia and that force.
@@ -97,27 +98,42 @@ def sample_period(
     numerical = output(benchmark.numerical, state.structure, load)
     target = frame_to_actuator(benchmark.coupler, numerical[:2])
 
-    seen = Observation(k, benchmark.dt, target, measured, estimate, corrected, delayed)
-    controller_state, decision = controller.step(state.controller, seen)
-    command = computed(decision.command_mm)
+    box, decision = compensator.decide_served(observed, target, delayed)
+    command = decision.command_mm
 
+    own = benchmark.force_filter
     after = LoopState(
         structure=advance(benchmark.numerical, state.structure, load),
         plant=advance(plant, state.plant, command),
-        filter=controller.estimator.predict(corrected, command),
+        compensator=box,
+        force_path=None if own is None else own.predict(known, command),
         interface=jnp.stack([interface, before[0]]),
-        controller=controller_state,
     )
     signals = {
         "x_a": target,
         "x_m": measured,
-        "x_hat": estimate,
+        "x_hat": felt,
         "u": command,
         "num": numerical,
         "est": interface,
         "force": force,
     }
     return after, signals | decision.signals, decision.record
+
+
+def felt_strokes(benchmark: Benchmark, predicted, measured, estimate) -> tuple[Any, jax.Array]:
+    """Strokes that the restoring force is made from, by the benchmark's ``force_from``.
+
+    Args:
+        predicted: the force path's own filter's prediction for k, if it has one.
+        measured, estimate: (2, T) x_m(k) and the controller's x_hat(k) [mm].
+
+    Returns:
+        what that filter knows at k, or None; (2, T) strokes [mm].
+    """
+    if benchmark.force_filter is not None:
+        return benchmark.force_filter.correct(predicted, measured)
+    return None, measured if benchmark.force_from == "measurement" else estimate
 
 
 @once
@@ -154,9 +170,9 @@ def run(
 ) -> tuple[IndexSums, watching.Watch, dict[str, jax.Array], Any]:
     """Run a batch of trials over a whole motion.
 
-    The scan over time is nested: windows of the controller's buffer length outside, in them pieces
-    that are cross-correlated, in these samples.  The rows that a window writes are what the next
-    one hands back as ``delayed``.
+    The scan over time is nested: windows of the controller's delay line outside, in them pieces
+    that are cross-correlated, in these samples.  The records that a window writes are what the next
+    one hands back, so the line costs neither a ring buffer nor its indices.
 
     Args:
         benchmark, controller: what stays; the controller is prepared.
@@ -180,7 +196,9 @@ def run(
     """
     rows = ground.shape[0]
     N = rows if samples is None else samples
-    length = controller.window or WINDOW
+    compensator = Compensator(controller, controller.estimator, benchmark.dt)
+    line = controller.delay_line(trials)
+    length = window_of(controller)
     part = segment or piece_length(length)
     windows = -(-rows // length)
 
@@ -190,9 +208,10 @@ def run(
 
     def sample(moving, inputs):
         state, *booked = moving
-        k, ground_k, reference_k, noise_k, delayed = inputs
+        ground_k, reference_k, noise_k, delayed = inputs
+        k = state.compensator.k
         state, signals, record = sample_period(
-            benchmark, controller, plant, state, k, ground_k, noise_k, delayed
+            benchmark, compensator, plant, state, ground_k, noise_k, delayed
         )
         valid = k < N
         booked = _book(booked, signals, reference_k[:, None], k, valid, tally)
@@ -216,12 +235,15 @@ def run(
         carry, outputs = jax.lax.scan(body, carry, jax.tree.map(cut, inputs))
         records, signals = jax.tree.map(join, outputs)
         (state, *rest), *correlations = carry
-        state = replace(state, controller=controller.turn(state.controller))
+        if line and line.renew:
+            box = state.compensator
+            box = replace(box, controller=line.renew(box.controller))
+            state = replace(state, compensator=box)
         return (records, ((state, *rest), *correlations)), signals
 
-    blank = controller.blank_record(trials)
+    blank = line.blank if line else None
     records = jax.tree.map(lambda x: jnp.zeros((length, *x.shape), x.dtype), blank)
-    state = initial_state(benchmark, controller, plant, trials)
+    state = initial_state(benchmark, compensator, plant, trials)
     extra = None if tally is None else tally.init(trials)
     carry = (
         records,
@@ -231,8 +253,7 @@ def run(
             (jnp.zeros((sum(lags) + 1, trials)),) * 4,
         ),
     )
-    numbers = jnp.arange(windows * length).reshape(windows, length)
-    inputs = (numbers, in_windows(ground), in_windows(reference), in_windows(noise))
+    inputs = (in_windows(ground), in_windows(reference), in_windows(noise))
     if samples is None:
         carry, signals = jax.lax.scan(window, carry, inputs)
     else:
@@ -261,6 +282,12 @@ def run(
         fs=benchmark.fs,
     )
     return index_sums, watch, signals, extra
+
+
+def window_of(controller: Controller) -> int:
+    """Length of the time loop's windows with a controller [samples]."""
+    line = controller.delay_line(1)
+    return line.samples if line else WINDOW
 
 
 def piece_length(window: int) -> int:

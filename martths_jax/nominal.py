@@ -11,7 +11,7 @@ import numpy as np
 
 from martths_jax import published
 from martths_jax.benchmark import Benchmark
-from martths_jax.controllers import ADFC, LQG, Controller
+from martths_jax.control.controllers import ADFC, LQG, Controller
 from martths_jax.indices import NAMES, indices
 from martths_jax.motions import Motion
 from martths_jax.plant import nominal_plant

@@ -16,8 +16,8 @@ from jax.sharding import PartitionSpec as P
 from martths_jax import checks, loop
 from martths_jax import watch as watching
 from martths_jax.benchmark import Benchmark
-from martths_jax.controllers import Controller
-from martths_jax.controllers.check import check_controller
+from martths_jax.control.check import check_controller
+from martths_jax.control.controllers import Controller
 from martths_jax.indices import IndexSums, peak_at_edge, trials_first
 from martths_jax.motions import Motion
 from martths_jax.plant import Plants

@@ -12,9 +12,7 @@ A is the derivative of the engine's own ``sample_period`` at rest, so nothing is
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import Any
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -22,46 +20,13 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 
 from martths_jax.benchmark import Benchmark
-from martths_jax.controllers import Controller, Decision
-from martths_jax.controllers.adfc import ADFC, TAPS, regress
+from martths_jax.control.base import Controller
+from martths_jax.control.compensator import Compensator
 from martths_jax.errors import argument_error
 from martths_jax.loop import initial_state, sample_period
 from martths_jax.plant import Plants
 from martths_jax.runtime import check_runtime
 from martths_jax.structure.modal import spread
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class FrozenFeedforward(Controller):
-    """u(k) = C' phi_a(k) with coefficients that stay: ADFC without its identification.
-
-    Attributes:
-        coefficients: (8, 2) or (8, 2, T), in scaled derivatives (``ADFC``'s ``C_A``).
-        estimator: the Kalman filter that runs with it.
-    """
-
-    coefficients: jax.Array
-    estimator: Any = None
-
-    name = "frozen"
-    shared_axes = MappingProxyType({"coefficients": 2})
-
-    def init(self, trials):
-        return ((jnp.zeros(trials),) * (TAPS - 1),) * 2
-
-    def step(self, state, seen):
-        state, phi = regress(state, seen.target_mm)
-        C = self.coefficients
-        command = [sum(C[j, i] * p for j, p in enumerate(phi)) for i in range(2)]
-        return state, Decision(command_mm=jnp.stack(command))
-
-
-def frozen_adfc(benchmark: Benchmark, adfc: ADFC, coefficients) -> FrozenFeedforward:
-    """The loop's controller when `adfc` stops adapting with the given (8, 2[, T]) coefficients."""
-    check_runtime()
-    ready = adfc.prepare(benchmark)
-    return FrozenFeedforward(jnp.asarray(coefficients, dtype=float), estimator=ready.estimator)
 
 
 def linear_loop(
@@ -71,8 +36,8 @@ def linear_loop(
 
     Args:
         benchmark: from ``build_benchmark``.
-        controller: a linear time-invariant one, prepared: ``Passthrough``, ``LQG``,
-            ``FrozenFeedforward`` (its coefficients one a trial or shared).
+        controller: a linear time-invariant one, prepared, such as what ``Controller.frozen`` gives
+            (its ``coefficients`` one a trial or shared).
         plants: T of them.
         opened: cut the loop at the plants' input: v (2 values, mm) drives the plants instead of
             the command u, while the filter still hears u.  Otherwise v = u.
@@ -81,10 +46,10 @@ def linear_loop(
         (T, n, n) A, or with `opened` the tuple A, B (T, n, 2), C (T, 2, n).
     """
     check_runtime()
-    if isinstance(controller, ADFC):
+    if controller.adapts:
         raise argument_error(
-            "controller", "be linear and time-invariant", "an adaptive ADFC",
-            "Freeze it: frozen_adfc(benchmark, adfc, coefficients).",
+            "controller", "be linear and time-invariant", f"{type(controller).__name__}, which "
+            "adapts", "Freeze it: controller.frozen(benchmark, coefficients).",
         )  # fmt: skip
     A, B, C = _linearised(benchmark, controller, plants.discretise(benchmark.dt))
     return (A, B, C) if opened else A + B @ C
@@ -98,16 +63,19 @@ def _linearised(benchmark, controller, system):
     def one(plant, coefficients):
         own = controller if shared else replace(controller, coefficients=coefficients)
         plant = jax.tree.map(lambda x: x[..., None], plant)
-        rest, unravel = ravel_pytree(initial_state(benchmark, own, plant, 1))
+        box = Compensator(own, own.estimator, benchmark.dt)
+        state = initial_state(benchmark, box, plant, 1)
+        # k = 1 stands for any sample after the first, whose differences are special.
+        at = lambda state, k: replace(state, compensator=replace(state.compensator, k=k))  # noqa: E731
+        rest, unravel = ravel_pytree(at(state, None))
 
         def step(xi, v):
-            # k = 1 stands for any sample after the first, whose differences are special.
             after, signals, _ = sample_period(
-                benchmark, own, plant, unravel(xi), jnp.asarray(1), 0.0, jnp.zeros((2, 1)), None
+                benchmark, box, plant, at(unravel(xi), jnp.asarray(1)), 0.0, jnp.zeros((2, 1)), None
             )
             command = signals["u"]
             driven = after.plant + spread(plant.B, v[:, None] - command)
-            return ravel_pytree(replace(after, plant=driven))[0], command[:, 0]
+            return ravel_pytree(at(replace(after, plant=driven), None))[0], command[:, 0]
 
         v = jnp.zeros(2)
         # No command acts on itself within a sample, so there is no direct term.
@@ -132,13 +100,17 @@ def spectral_radius(benchmark: Benchmark, controller: Controller, plants: Plants
 
 
 def radius_along(
-    benchmark: Benchmark, adfc: ADFC, plants: Plants, coefficients, samples: Sequence[int]
+    benchmark: Benchmark,
+    controller: Controller,
+    plants: Plants,
+    coefficients,
+    samples: Sequence[int],
 ) -> np.ndarray:
     """Spectral radius of the frozen loop along a run: the diagnostic signal.
 
     Args:
-        benchmark, adfc, plants: of the run.
-        coefficients: (T, N, 8, 2) ``result.signals["C_A"]``.
+        benchmark, controller, plants: of the run.
+        coefficients: (T, N, ...) what adapts, as the controller's signals hold it.
         samples: S numbers of samples at which to freeze.
 
     Returns:
@@ -146,7 +118,8 @@ def radius_along(
     """
     chosen = np.asarray(coefficients)[:, np.asarray(samples)]
     T, S = chosen.shape[:2]
-    frozen = frozen_adfc(benchmark, adfc, np.moveaxis(chosen.reshape(T * S, 8, 2), 0, -1))
+    each = np.moveaxis(chosen.reshape(T * S, *chosen.shape[2:]), 0, -1)
+    frozen = controller.frozen(benchmark, each)
     return spectral_radius(benchmark, frozen, plants[np.repeat(np.arange(T), S)]).reshape(T, S)
 
 

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from martths_jax.campaign.statistics import compare, percentile
 from martths_jax.files import atomic
 from martths_jax.plant import PARAMETERS
-from martths_jax.study.statistics import compare, percentile
 from martths_jax.study.summary import Table, number, with_interval
 from martths_jax.sweep import open_sweep
 from martths_jax.sweep.axes import OVERLAPS

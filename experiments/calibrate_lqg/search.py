@@ -25,7 +25,7 @@ from linear_loop import LinearLoop
 from scipy import linalg, optimize
 
 from martths_jax import load_motion
-from martths_jax.kalman import steady_state_gains
+from martths_jax.control.estimators.kalman import steady_state_gains
 from martths_jax.published import LQG, TABLE4
 
 RESULTS = Path(__file__).with_name("results")

@@ -22,8 +22,8 @@ from search import DESIGNS, RECORDS, RESULTS, START, rms_log, to_gains
 from soundness import OTHER
 
 from martths_jax import LQG, build_benchmark, indices, load_motion, plant_from_draws, simulate
+from martths_jax.control.estimators import KalmanFilter
 from martths_jax.indices import NAMES
-from martths_jax.kalman import KalmanFilter
 from martths_jax.published import LQG as COLUMN
 from martths_jax.published import TABLE4
 

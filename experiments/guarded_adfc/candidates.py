@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from fast_loop import Guard, slots
 
-from martths_jax.controllers.adfc import BACKWARD_DIFFERENCES
-from martths_jax.controllers.inverse import nominal_inverse
-from martths_jax.kalman import design_kalman
+from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES
+from martths_jax.control.adaptive.inverse import nominal_inverse
+from martths_jax.control.estimators import design_kalman
 from martths_jax.structure.modal import to_dense
 
 Q = 3e-5

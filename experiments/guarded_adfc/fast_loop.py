@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from martths_jax.benchmark import VOLT_OFFSET, VOLT_PER_MM
+from martths_jax.control.estimators import design_kalman
 from martths_jax.indices import NAMES, PAIRS
-from martths_jax.kalman import design_kalman
 from martths_jax.structure.modal import respond
 
 HERE = Path(__file__).parent

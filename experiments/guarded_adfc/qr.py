@@ -14,7 +14,7 @@ from scipy import linalg
 from study import RECORDS
 
 from martths_jax import build_benchmark, draw_plants, load_motion
-from martths_jax.controllers.adfc import BACKWARD_DIFFERENCES, TAPS
+from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES, TAPS
 
 NB, PLANTS, STEP = 1024, 200, 16
 

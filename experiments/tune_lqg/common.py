@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from martths_jax import draw_plants, indices, load_motion, simulate
-from martths_jax.controllers import Controller
+from martths_jax.control.controllers import Controller
 from martths_jax.indices import NAMES
 from martths_jax.sensors import SensorNoise
 

@@ -12,6 +12,8 @@ from rich.markup import escape
 
 from martths_jax import published
 from martths_jax.benchmark import Benchmark, build_benchmark
+from martths_jax.campaign import plan
+from martths_jax.campaign.export import save_mat
 from martths_jax.cli.console import console, error_console, progress
 from martths_jax.cli.motion_options import (
     Dt,
@@ -25,7 +27,7 @@ from martths_jax.cli.motion_options import (
     Variable,
     load_all,
 )
-from martths_jax.controllers import Controller
+from martths_jax.control.controllers import Controller
 from martths_jax.errors import argument_error
 from martths_jax.files import atomic, safe_name
 from martths_jax.indices import indices
@@ -37,8 +39,7 @@ from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import simulate
 from martths_jax.structure.frame import build_reference
 from martths_jax.structure.frame import modes as natural_modes
-from martths_jax.study import make_config, plan
-from martths_jax.study.export import save_mat
+from martths_jax.study import make_config
 
 #: The paper's records as a folder of theirs names them, and the built-in motions that stand in.
 REAL = ("elcentro", "kobe", "morganhill")

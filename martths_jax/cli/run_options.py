@@ -8,9 +8,9 @@ from typing import Annotated
 import jax
 import typer
 
+from martths_jax.campaign.given import split_list
 from martths_jax.cli.console import error_console
 from martths_jax.study import Bars, Lines, Reporter
-from martths_jax.study.given import split_list
 
 Config = Annotated[
     Path | None, typer.Option("--config", help="TOML file of a study; flags override it.")

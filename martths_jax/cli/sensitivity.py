@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from martths_jax.campaign.config import read_toml
+from martths_jax.campaign.provenance import command_line
 from martths_jax.cli.console import console
 from martths_jax.cli.motion_options import (
     Dt,
@@ -37,8 +39,6 @@ from martths_jax.cli.run_options import (
 )
 from martths_jax.sensitivity import run_sensitivity
 from martths_jax.sensitivity.results import leading
-from martths_jax.study.config import read_toml
-from martths_jax.study.provenance import command_line
 from martths_jax.sweep.config import SHOWN
 
 

@@ -9,6 +9,11 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from martths_jax.campaign.config import make_config, read_toml
+from martths_jax.campaign.distributed import JOIN_TIMEOUT, LOST_TIMEOUT, join
+from martths_jax.campaign.export import export_plants, study_signals, write_csv, write_mat
+from martths_jax.campaign.provenance import command_line
+from martths_jax.campaign.template import write_template
 from martths_jax.cli.console import console, error_console
 from martths_jax.cli.motion_options import (
     Dt,
@@ -32,11 +37,6 @@ from martths_jax.cli.run_options import (
 )
 from martths_jax.errors import InputError, argument_error
 from martths_jax.study import Study, merge_runs, open_study, run_study
-from martths_jax.study.config import make_config, read_toml
-from martths_jax.study.distributed import JOIN_TIMEOUT, LOST_TIMEOUT, join
-from martths_jax.study.export import export_plants, study_signals, write_csv, write_mat
-from martths_jax.study.provenance import command_line
-from martths_jax.study.template import write_template
 from martths_jax.text import counted
 
 Folder = Annotated[Path, typer.Argument(help="Folder of a study.")]

@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from martths_jax.campaign.config import read_toml
+from martths_jax.campaign.provenance import command_line
 from martths_jax.cli.console import console
 from martths_jax.cli.motion_options import (
     Dt,
@@ -35,8 +37,6 @@ from martths_jax.cli.run_options import (
     set_devices,
     words,
 )
-from martths_jax.study.config import read_toml
-from martths_jax.study.provenance import command_line
 from martths_jax.sweep import make_sweep, run_sweep
 from martths_jax.sweep.axes import split_axis
 from martths_jax.sweep.config import SHOWN

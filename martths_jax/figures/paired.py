@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from martths_jax.campaign.statistics import LEVEL, compare
 from martths_jax.figures.source import Source
 from martths_jax.figures.style import (
     DOUBLE,
@@ -15,7 +16,6 @@ from martths_jax.figures.style import (
     new_figure,
 )
 from martths_jax.indices import NAMES
-from martths_jax.study.statistics import LEVEL, compare
 
 
 def paired(source: Source, pair: tuple[str, str]) -> Drawing:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.progress import Reporter
+from martths_jax.campaign.store import RunFolder
 from martths_jax.errors import InputError
 from martths_jax.study.merge import engine_again
-from martths_jax.study.progress import Reporter
 from martths_jax.study.results import Study, open_study
 from martths_jax.study.signals import store_signals
-from martths_jax.study.store import RunFolder
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm, qmc
 
+from martths_jax.campaign.memory import RESULT_BYTES
 from martths_jax.plant import PARAMETERS, Plants
 from martths_jax.resources import available_memory
-from martths_jax.study.memory import RESULT_BYTES
 
 #: The factor that picks the noise realisation, and the one that picks the motion.
 NOISE, MOTION = "noise", "motion"

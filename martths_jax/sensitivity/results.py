@@ -8,20 +8,20 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from martths_jax.indices import NAMES
-from martths_jax.sensitivity.design import Design
-from martths_jax.sensitivity.estimators import LEVEL, RESAMPLES, SobolIndices, sobol, verdicts
-from martths_jax.sensitivity.store import ROWS
-from martths_jax.study.dataset import (
+from martths_jax.campaign.dataset import (
     INDEX_UNITS,
     STATUS_FLAGS,
     attributes,
     read_results,
     save_dataset,
 )
-from martths_jax.study.files import write_text, writing
-from martths_jax.study.plan import Plan
-from martths_jax.study.store import RunFolder
+from martths_jax.campaign.files import write_text, writing
+from martths_jax.campaign.plan import Plan
+from martths_jax.campaign.store import RunFolder
+from martths_jax.indices import NAMES
+from martths_jax.sensitivity.design import Design
+from martths_jax.sensitivity.estimators import LEVEL, RESAMPLES, SobolIndices, sobol, verdicts
+from martths_jax.sensitivity.store import ROWS
 from martths_jax.study.summary import Summary, Table
 from martths_jax.text import counted, csv_field
 

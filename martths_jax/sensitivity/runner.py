@@ -8,6 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.config import StudyConfig, make_config, read_toml, unknown_names
+from martths_jax.campaign.engine import Outcome, choose_devices
+from martths_jax.campaign.lanes import LaneEngine
+from martths_jax.campaign.memory import GB, choose_chunk, lane_bytes
+from martths_jax.campaign.plan import Plan, build_plan
+from martths_jax.campaign.progress import Reporter, Tally, compile_seconds
 from martths_jax.errors import argument_error, raise_all
 from martths_jax.indices import NAMES
 from martths_jax.plant import check_plants
@@ -16,14 +22,8 @@ from martths_jax.sensitivity.design import Design, is_power_of_two, make_design,
 from martths_jax.sensitivity.results import Sensitivity, write_results
 from martths_jax.sensitivity.store import ROWS, SensitivityFolder
 from martths_jax.simulation import LANES, Setup
-from martths_jax.study.config import StudyConfig, make_config, read_toml, unknown_names
-from martths_jax.study.engine import Outcome, choose_devices
-from martths_jax.study.memory import GB, choose_chunk, lane_bytes
-from martths_jax.study.plan import Plan, build_plan
-from martths_jax.study.progress import Reporter, Tally, compile_seconds
 from martths_jax.study.runner import Session, header
 from martths_jax.sweep.config import SHOWN
-from martths_jax.sweep.lanes import LaneEngine
 from martths_jax.text import counted
 from martths_jax.watch import Status
 

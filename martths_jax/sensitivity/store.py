@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from martths_jax.campaign.store import OWN, RunFolder
 from martths_jax.errors import InputError
-from martths_jax.study.store import OWN, RunFolder
 
 #: Stands for the motion in the names of the parts: rows of all motions are stored together.
 ROWS = "rows"

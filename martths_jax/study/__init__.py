@@ -6,9 +6,9 @@ study = run_study(trials=200, seed=1, out="first")
 print(study.summary())
 """
 
-from martths_jax.study.config import StudyConfig, make_config
+from martths_jax.campaign.config import StudyConfig, make_config
+from martths_jax.campaign.progress import Bars, Lines, Reporter
 from martths_jax.study.merge import merge_runs
-from martths_jax.study.progress import Bars, Lines, Reporter
 from martths_jax.study.results import Study, open_study
 from martths_jax.study.runner import run_study
 

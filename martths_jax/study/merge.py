@@ -7,16 +7,16 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from martths_jax.campaign import provenance
+from martths_jax.campaign.config import make_config
+from martths_jax.campaign.files import write_text, writing
+from martths_jax.campaign.machine import MIXED_NOTE
+from martths_jax.campaign.plan import build_plan
+from martths_jax.campaign.progress import Reporter
+from martths_jax.campaign.store import PLANTS, RunFolder
 from martths_jax.errors import InputError, raise_all
-from martths_jax.study import provenance
-from martths_jax.study.config import make_config
-from martths_jax.study.files import write_text, writing
-from martths_jax.study.machine import MIXED_NOTE
-from martths_jax.study.plan import build_plan
-from martths_jax.study.progress import Reporter
 from martths_jax.study.results import Study
 from martths_jax.study.runner import finish, make_engine, read_provenance
-from martths_jax.study.store import PLANTS, RunFolder
 
 
 def merge_runs(

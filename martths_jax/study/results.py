@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from martths_jax.campaign.dataset import read_dataset, read_results
 from martths_jax.errors import InputError
-from martths_jax.study.dataset import read_dataset, read_results
 from martths_jax.study.signals import group
 from martths_jax.study.summary import Summary, summarise
 from martths_jax.text import counted

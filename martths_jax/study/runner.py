@@ -12,27 +12,27 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from martths_jax.campaign import provenance
+from martths_jax.campaign.config import StudyConfig, as_settings, make_config
+from martths_jax.campaign.dataset import assemble, save_dataset
+from martths_jax.campaign.distributed import Meeting
+from martths_jax.campaign.engine import Engine, choose_devices
+from martths_jax.campaign.export import write_csv
+from martths_jax.campaign.files import disk_errors, set_aside, write_text
+from martths_jax.campaign.machine import machine_digest, machine_identity
+from martths_jax.campaign.memory import GB, check_results, choose_chunk, lane_bytes
+from martths_jax.campaign.owner import door
+from martths_jax.campaign.plan import Plan, build_plan
+from martths_jax.campaign.progress import Reporter, Tally, compile_seconds
+from martths_jax.campaign.store import RunFolder
+from martths_jax.campaign.template import write_config
 from martths_jax.errors import InputError
 from martths_jax.motions import Motion
 from martths_jax.runtime import check_runtime
 from martths_jax.simulation import LANES
-from martths_jax.study import provenance
-from martths_jax.study.config import StudyConfig, as_settings, make_config
-from martths_jax.study.dataset import assemble, save_dataset
-from martths_jax.study.distributed import Meeting
-from martths_jax.study.engine import Engine, choose_devices
-from martths_jax.study.export import write_csv
-from martths_jax.study.files import disk_errors, set_aside, write_text
-from martths_jax.study.machine import machine_digest, machine_identity
-from martths_jax.study.memory import GB, check_results, choose_chunk, lane_bytes
-from martths_jax.study.owner import door
-from martths_jax.study.plan import Plan, build_plan
-from martths_jax.study.progress import Reporter, Tally, compile_seconds
 from martths_jax.study.results import Study
 from martths_jax.study.signals import store_signals
-from martths_jax.study.store import RunFolder
 from martths_jax.study.summary import summarise
-from martths_jax.study.template import write_config
 from martths_jax.text import counted
 from martths_jax.watch import Status
 

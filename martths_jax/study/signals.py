@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from martths_jax.campaign.dataset import read_dataset, write_dataset
+from martths_jax.campaign.engine import Engine
+from martths_jax.campaign.files import writing
+from martths_jax.campaign.store import FORMAT
 from martths_jax.errors import InputError
 from martths_jax.files import safe_name
 from martths_jax.indices import NAMES
 from martths_jax.simulation import FEW
-from martths_jax.study.dataset import read_dataset, write_dataset
-from martths_jax.study.engine import Engine
-from martths_jax.study.files import writing
-from martths_jax.study.store import FORMAT
 from martths_jax.watch import Status
 
 #: The index that ranks trials.

@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 
 from martths_jax import published
+from martths_jax.campaign.statistics import LEVEL, PERCENTS, Estimate, compare, percentile
 from martths_jax.indices import NAMES
 from martths_jax.screen import ScreenTable
-from martths_jax.study.statistics import LEVEL, PERCENTS, Estimate, compare, percentile
 from martths_jax.text import counted, markdown_text
 from martths_jax.watch import Status
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from martths_jax.campaign.fields import is_number, is_positive
 from martths_jax.errors import InputError
-from martths_jax.study.fields import is_number, is_positive
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from martths_jax.campaign.config import StudyConfig, make_config, read_toml, unknown_names
 from martths_jax.errors import InputError, raise_all
 from martths_jax.indices import NAMES
 from martths_jax.motions import Motion
-from martths_jax.study.config import StudyConfig, make_config, read_toml, unknown_names
 from martths_jax.sweep.axes import Axis, make_axes
 from martths_jax.sweep.grid import Grid, build_grid
 

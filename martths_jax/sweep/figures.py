@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.statistics import LEVEL, percentile, proportion
 from martths_jax.figures.style import (
     DOUBLE,
     Drawing,
@@ -22,7 +23,6 @@ from martths_jax.figures.style import (
 )
 from martths_jax.files import safe_name
 from martths_jax.indices import DELAYS
-from martths_jax.study.statistics import LEVEL, percentile, proportion
 from martths_jax.sweep.axes import OVERLAPS, Axis
 from martths_jax.sweep.results import Sweep
 from martths_jax.watch import Status

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from martths_jax.study.config import StudyConfig
-from martths_jax.study.plan import KINDS, defaults
+from martths_jax.campaign.config import StudyConfig
+from martths_jax.campaign.plan import KINDS, defaults
 from martths_jax.sweep.axes import OVERLAPS, Axis
 
 #: Settings of a job that shape a batch: what must be the same for all its lanes.

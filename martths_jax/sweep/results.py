@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from martths_jax.indices import NAMES
-from martths_jax.plant import PARAMETERS
-from martths_jax.study.dataset import (
+from martths_jax.campaign.dataset import (
     INDEX_UNITS,
     STATUS_FLAGS,
     attributes,
     read_results,
     save_dataset,
 )
-from martths_jax.study.engine import FIRSTS
-from martths_jax.study.files import write_text, writing
-from martths_jax.study.statistics import percentile
-from martths_jax.study.store import RunFolder
+from martths_jax.campaign.engine import FIRSTS
+from martths_jax.campaign.files import write_text, writing
+from martths_jax.campaign.statistics import percentile
+from martths_jax.campaign.store import RunFolder
+from martths_jax.indices import NAMES
+from martths_jax.plant import PARAMETERS
 from martths_jax.study.summary import Summary, Table, extent, number
 from martths_jax.sweep.axes import SCALARS, Axis
 from martths_jax.sweep.config import SHOWN, SweepConfig

@@ -9,20 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.config import StudyConfig
+from martths_jax.campaign.draws import Draws
+from martths_jax.campaign.engine import Outcome, choose_devices
+from martths_jax.campaign.lanes import LaneEngine, Worlds
+from martths_jax.campaign.memory import GB, choose_chunk, lane_bytes
+from martths_jax.campaign.plan import Plan, build_controller, build_plan, motion_identity
+from martths_jax.campaign.progress import Reporter, Tally, compile_seconds
 from martths_jax.errors import InputError, raise_all
 from martths_jax.plant import check_plants
 from martths_jax.runtime import check_runtime
 from martths_jax.simulation import LANES, Setup, prepare
-from martths_jax.study.config import StudyConfig
-from martths_jax.study.draws import Draws
-from martths_jax.study.engine import Outcome, choose_devices
-from martths_jax.study.memory import GB, choose_chunk, lane_bytes
-from martths_jax.study.plan import Plan, build_controller, build_plan, motion_identity
-from martths_jax.study.progress import Reporter, Tally, compile_seconds
 from martths_jax.study.runner import Session, header
 from martths_jax.sweep.config import SHOWN, SweepConfig, make_sweep
 from martths_jax.sweep.grid import Job, job_config
-from martths_jax.sweep.lanes import LaneEngine, Worlds
 from martths_jax.sweep.results import Sweep, write_results
 from martths_jax.sweep.store import SweepFolder, sweep_identity
 from martths_jax.text import counted

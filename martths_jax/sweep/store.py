@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from martths_jax.study.store import OWN, RunFolder
+from martths_jax.campaign.store import OWN, RunFolder
 from martths_jax.sweep.config import SweepConfig
 
 #: What a sweep leaves in its folder, beside the figures.

@@ -77,7 +77,7 @@ class Gradient:
                 lags=lags,
                 segment=0
                 if forward
-                else segment_length(ground.shape[0], ready.window or loop.WINDOW),
+                else segment_length(ground.shape[0], loop.window_of(ready)),
                 tally=objective.tally,
             )
             loss, smooth = objective.evaluate(sums, watch, peaks, weights)

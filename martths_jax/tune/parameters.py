@@ -9,12 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from martths_jax.benchmark import Benchmark
-from martths_jax.controllers import ADFC, LQG, Controller
-from martths_jax.controllers.adfc import GUARD_PULL
-from martths_jax.controllers.lqg import FITTED
-from martths_jax.design.lqg import WEIGHTS, kalman_gain, lqg_from_weights
+from martths_jax.control.controllers import ADFC, LQG, Controller
+from martths_jax.control.controllers.adfc import GUARD_PULL
+from martths_jax.control.controllers.lqg import FITTED
+from martths_jax.control.design.lqg import WEIGHTS, kalman_gain, lqg_from_weights
+from martths_jax.control.estimators import KalmanFilter
 from martths_jax.errors import argument_error
-from martths_jax.kalman import KalmanFilter
 
 #: Controller -> its tunable numbers: LQG's weights, or ADFC's pull towards the inverse plant, and
 #: the filter's q.

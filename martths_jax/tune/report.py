@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from martths_jax.benchmark import Benchmark
+from martths_jax.campaign.files import write_text
 from martths_jax.files import atomic
 from martths_jax.indices import NAMES, indices
 from martths_jax.motions import Motion
@@ -16,7 +17,6 @@ from martths_jax.plant import draw_plants
 from martths_jax.published import ADFC, LQG, TABLE4
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import simulate
-from martths_jax.study.files import write_text
 from martths_jax.tune.parameters import host_controller
 
 FRESH = 1_000_001  # first trial number of the fresh plants; tuning starts at 1

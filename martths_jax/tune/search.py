@@ -13,18 +13,18 @@ import numpy as np
 import optax
 
 from martths_jax.benchmark import VOLT_LIMIT, Benchmark
+from martths_jax.campaign.files import set_aside, write_text
+from martths_jax.campaign.header import sealed
+from martths_jax.campaign.machine import machine_identity
+from martths_jax.campaign.owner import Owner, owned
+from martths_jax.campaign.plan import motion_identity
+from martths_jax.campaign.provenance import differences, versions
+from martths_jax.campaign.sources import engine_code
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import Motion
 from martths_jax.plant import draw_plants
 from martths_jax.runtime import check_runtime
 from martths_jax.sensors import SensorNoise
-from martths_jax.study.files import set_aside, write_text
-from martths_jax.study.header import sealed
-from martths_jax.study.machine import machine_identity
-from martths_jax.study.owner import Owner, owned
-from martths_jax.study.plan import motion_identity
-from martths_jax.study.provenance import differences, versions
-from martths_jax.study.sources import engine_code
 from martths_jax.tune.gradient import Gradient
 from martths_jax.tune.objective import Objective
 from martths_jax.tune.parameters import start_of

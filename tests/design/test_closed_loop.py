@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from martths_jax import LQG, InputError, build_benchmark, nominal_plant
-from martths_jax.controllers.lqg import check_weights
-from martths_jax.design.closed_loop import lowest_stable_rate, nominal_radius
+from martths_jax.control.controllers.lqg import check_weights
+from martths_jax.control.design.closed_loop import lowest_stable_rate, nominal_radius
 from martths_jax.stability import spectral_radius
 
 Q = 3e-5

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from martths_jax.design.riccati import care, dare
+from martths_jax.algebra.riccati import care, dare
 
 SOLVERS = {"care": (care, linalg.solve_continuous_are), "dare": (dare, linalg.solve_discrete_are)}
 

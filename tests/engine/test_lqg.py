@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from martths_jax import LQG, InputError, nominal_plant, simulate
-from martths_jax.controllers.lqg import FITTED
-from martths_jax.study.config import StudyConfig
-from martths_jax.study.plan import build_controller
+from martths_jax.campaign.config import StudyConfig
+from martths_jax.campaign.plan import build_controller
+from martths_jax.control.controllers.lqg import FITTED
 from tests.engine.motions import burst
 
 

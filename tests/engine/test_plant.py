@@ -8,8 +8,8 @@ from scipy import signal
 
 from martths_jax import InputError, build_coupler, draw_plants, nominal_plant, plant_from_draws
 from martths_jax.benchmark import continuous_plant
+from martths_jax.control.estimators.kalman import design_kalman, steady_state_gains
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
-from martths_jax.kalman import design_kalman, steady_state_gains
 from martths_jax.plant import HZ, SIGMA, frequency_response
 from martths_jax.structure.modal import to_dense
 

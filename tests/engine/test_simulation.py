@@ -24,8 +24,8 @@ from martths_jax import (
     nominal_plant,
     simulate,
 )
+from martths_jax.control.estimators import DirectMeasurement
 from martths_jax.indices import NAMES, PAIRS
-from martths_jax.kalman import DirectMeasurement
 from tests.engine.motions import burst
 
 QUIET = SensorNoise(power=0.0)

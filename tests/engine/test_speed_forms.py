@@ -15,8 +15,8 @@ from martths_jax import (
     simulate,
     simulation,
 )
-from martths_jax.controllers import least_squares as ls
-from martths_jax.controllers.adfc import BACKWARD_DIFFERENCES, TAPS, regress
+from martths_jax.algebra import least_squares as ls
+from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES, TAPS, regress
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
 from martths_jax.indices import NAMES, correlate
 from tests.engine.motions import burst

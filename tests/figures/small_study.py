@@ -15,14 +15,14 @@ import pytest
 import xarray as xr
 
 from martths_jax import Motion
+from martths_jax.campaign.dataset import read_dataset, write_dataset
+from martths_jax.campaign.engine import Outcome
+from martths_jax.campaign.plan import build_plan
+from martths_jax.campaign.store import FORMAT, RunFolder
 from martths_jax.indices import DELAYS, NAMES
 from martths_jax.study import make_config
-from martths_jax.study.dataset import read_dataset, write_dataset
-from martths_jax.study.engine import Outcome
-from martths_jax.study.plan import build_plan
 from martths_jax.study.runner import header, write_results
 from martths_jax.study.signals import LAYOUT, choose_trials, group
-from martths_jax.study.store import FORMAT, RunFolder
 from martths_jax.watch import Status
 from tests.engine.motions import burst
 

@@ -44,7 +44,7 @@ def test_signals_may_be_left_out(study_folder, tmp_path):
 
 
 def test_a_matlab_file_beyond_its_format_is_refused(study_folder, tmp_path, monkeypatch):
-    monkeypatch.setattr("martths_jax.study.export.MOST_BYTES", 100_000)
+    monkeypatch.setattr("martths_jax.campaign.export.MOST_BYTES", 100_000)
     done = export(study_folder, "--mat", tmp_path / "a.mat")
     assert isinstance(done.exception, InputError) and not list(tmp_path.iterdir())
     with pytest.raises(InputError, match="Variable `signals` is too large"):

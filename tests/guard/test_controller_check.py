@@ -20,8 +20,8 @@ from martths_jax import (
     simulate,
     simulation,
 )
-from martths_jax.controllers.check import PROBE, RESERVED, check_controller
-from martths_jax.kalman import DirectMeasurement
+from martths_jax.control.check import PROBE, RESERVED, check_controller
+from martths_jax.control.estimators import DirectMeasurement
 from tests.engine.motions import burst
 
 DT = 1 / 1024
@@ -144,7 +144,7 @@ def test_it_is_said_before_anything_is_compiled(benchmark, monkeypatch):
 
 
 def test_good_controllers_pass_once_for_all(benchmark, monkeypatch):
-    from martths_jax.controllers import check
+    from martths_jax.control.controllers import check
 
     monkeypatch.setattr(check, "_GOOD", {})
     ready = ADFC(nb=64, no=63).prepare(benchmark)

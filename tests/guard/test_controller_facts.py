@@ -22,9 +22,10 @@ from martths_jax import (
     nominal_plant,
     simulate,
 )
-from martths_jax.controllers.adfc import BACKWARD_DIFFERENCES, GUARD_PULL, TAPS
-from martths_jax.controllers.inverse import nominal_inverse
-from martths_jax.kalman import DirectMeasurement
+from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES, TAPS
+from martths_jax.control.adaptive.inverse import nominal_inverse
+from martths_jax.control.controllers.adfc import GUARD_PULL
+from martths_jax.control.estimators import DirectMeasurement
 from martths_jax.stability import frozen_adfc, spectral_radius
 from martths_jax.watch import Status
 from tests.engine.motions import burst

@@ -19,10 +19,11 @@ from martths_jax import (
     simulate,
     simulation,
 )
-from martths_jax.controllers import adfc
-from martths_jax.controllers import least_squares as ls
-from martths_jax.controllers.adfc import BACKWARD_DIFFERENCES, CONDITION_LIMIT
-from martths_jax.controllers.inverse import nominal_inverse
+from martths_jax.algebra import least_squares as ls
+from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES
+from martths_jax.control.adaptive.inverse import nominal_inverse
+from martths_jax.control.controllers import adfc
+from martths_jax.control.controllers.adfc import CONDITION_LIMIT
 from martths_jax.indices import trials_last
 from martths_jax.plant import frequency_response
 from tests.engine.motions import burst

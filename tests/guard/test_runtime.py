@@ -24,9 +24,9 @@ from martths_jax import (
     runtime,
     simulate,
 )
-from martths_jax.design.lqg import WEIGHTS, kalman_gain, lqg_from_weights
-from martths_jax.design.riccati import care, dare
-from martths_jax.kalman import design_kalman
+from martths_jax.algebra.riccati import care, dare
+from martths_jax.control.design.lqg import WEIGHTS, kalman_gain, lqg_from_weights
+from martths_jax.control.estimators import design_kalman
 from martths_jax.plant import NOMINAL_HZ
 from martths_jax.sensitivity import run_sensitivity
 from martths_jax.stability import delay_margin, frozen_adfc, linear_loop, spectral_radius

@@ -18,8 +18,8 @@ from martths_jax import (
     plant_from_draws,
     simulate,
 )
-from martths_jax.controllers.adfc import BACKWARD_DIFFERENCES
-from martths_jax.controllers.inverse import nominal_inverse
+from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES
+from martths_jax.control.adaptive.inverse import nominal_inverse
 from martths_jax.stability import (
     delay_margin,
     frozen_adfc,

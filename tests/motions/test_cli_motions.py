@@ -8,11 +8,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from martths_jax.campaign.config import make_config, read_toml
 from martths_jax.cli import app as main_app
 from martths_jax.cli import motion_options as options
 from martths_jax.cli.motions import app
 from martths_jax.errors import InputError
-from martths_jax.study.config import make_config, read_toml
 
 runner = CliRunner()
 

@@ -2,7 +2,7 @@ import os
 
 import pytest
 
-from martths_jax.study import provenance
+from martths_jax.campaign import provenance
 
 
 @pytest.fixture(autouse=True, scope="package")

@@ -3,8 +3,8 @@
 import numpy as np
 
 from martths_jax import Motion
+from martths_jax.campaign.memory import lane_bytes
 from martths_jax.simulation import LANES
-from martths_jax.study.memory import lane_bytes
 
 SAMPLES = 600
 #: Memory [GB] that holds exactly one block of such trials, so one device is used.

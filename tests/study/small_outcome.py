@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from martths_jax.campaign.engine import Outcome
 from martths_jax.indices import NAMES
-from martths_jax.study.engine import Outcome
 
 
 def outcome(trials: int, seed: int = 0, **changes) -> Outcome:

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from martths_jax import ADFC, InputError
+from martths_jax.campaign import draws as draws_module
+from martths_jax.campaign import memory
+from martths_jax.campaign.config import make_config, read_toml
+from martths_jax.campaign.draws import even_draws
+from martths_jax.campaign.fields import FIELDS, MOST_TRIALS
+from martths_jax.campaign.plan import build_plan
 from martths_jax.cli import main
 from martths_jax.sensitivity.design import most_samples
 from martths_jax.sensitivity.runner import build
-from martths_jax.study import draws as draws_module
-from martths_jax.study import memory
-from martths_jax.study.config import make_config, read_toml
-from martths_jax.study.draws import even_draws
-from martths_jax.study.fields import FIELDS, MOST_TRIALS
-from martths_jax.study.plan import build_plan
 from martths_jax.study.runner import run_study
 from martths_jax.study.summary import summarise
 from martths_jax.text import shortened
@@ -115,8 +115,8 @@ def test_values_in_messages_are_cut():
 
 def test_the_title_counts_trials_with_all_indices(tmp_path):
     config = make_config(small(tmp_path, motions=(short_motion(),), trials=3))
+    from martths_jax.campaign.store import RunFolder
     from martths_jax.study.runner import header, write_results
-    from martths_jax.study.store import RunFolder
     from tests.study.small_outcome import outcome
 
     run = RunFolder.start(tmp_path, header(build_plan(config), ""))

@@ -5,11 +5,11 @@ import tomllib
 import pytest
 
 from martths_jax import ADFC, InputError
+from martths_jax.campaign.config import make_config, read_toml
+from martths_jax.campaign.plan import build_plan
+from martths_jax.campaign.template import template, write_config, write_template
 from martths_jax.motions import BUILTIN_NAMES
 from martths_jax.study import StudyConfig
-from martths_jax.study.config import make_config, read_toml
-from martths_jax.study.plan import build_plan
-from martths_jax.study.template import template, write_config, write_template
 from tests.study.places import short_motion, small
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from martths_jax import InputError, draw_plants
+from martths_jax.campaign.config import make_config
+from martths_jax.campaign.draws import Draws, even_draws, make_draws, read_plants, write_plants
 from martths_jax.plant import NOMINAL_HZ, PARAMETERS, SIGMA
-from martths_jax.study.config import make_config
-from martths_jax.study.draws import Draws, even_draws, make_draws, read_plants, write_plants
 from tests.study.places import small
 
 
@@ -96,8 +96,8 @@ def test_a_file_sets_the_number_of_trials_and_unstable_plants_are_refused(tmp_pa
 
 
 def test_a_study_of_exported_plants_is_the_same_study(tmp_path):
+    from martths_jax.campaign.export import export_plants
     from martths_jax.study import run_study
-    from martths_jax.study.export import export_plants
 
     first = run_study(small(tmp_path / "a"))
     export_plants(first.dataset, tmp_path / "p.csv")

@@ -16,13 +16,13 @@ import numpy as np, xarray as xr
 from martths_jax import InputError, Motion
 from martths_jax.figures.style import Drawing, new_figure, save
 from martths_jax.study import make_config
-from martths_jax.study.dataset import save_dataset, write_dataset
-from martths_jax.study.draws import write_plants
-from martths_jax.study.export import write_csv, write_mat
-from martths_jax.study.files import write_text, writing
-from martths_jax.study.plan import build_plan
+from martths_jax.campaign.dataset import save_dataset, write_dataset
+from martths_jax.campaign.draws import write_plants
+from martths_jax.campaign.export import write_csv, write_mat
+from martths_jax.campaign.files import write_text, writing
+from martths_jax.campaign.plan import build_plan
 from martths_jax.study.runner import header, write_results
-from martths_jax.study.store import RunFolder
+from martths_jax.campaign.store import RunFolder
 from tests.study.small_outcome import outcome
 
 out, limit = Path(sys.argv[1]), int(sys.argv[2])

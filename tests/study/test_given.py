@@ -8,15 +8,15 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from martths_jax import ADFC, LQG, InputError, Passthrough
+from martths_jax.campaign.config import read_toml
+from martths_jax.campaign.given import split_list
+from martths_jax.campaign.plan import build_plan
 from martths_jax.cli import app
 from martths_jax.cli.run_options import words
 from martths_jax.figures import draw_figures
 from martths_jax.figures.style import look
 from martths_jax.report import render
 from martths_jax.study import make_config, run_study
-from martths_jax.study.config import read_toml
-from martths_jax.study.given import split_list
-from martths_jax.study.plan import build_plan
 from martths_jax.study.summary import pairs
 from martths_jax.sweep import make_sweep
 from tests.study.places import short_motion, small

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from martths_jax import InputError
+from martths_jax.campaign.config import make_config
+from martths_jax.campaign.export import write_csv
+from martths_jax.campaign.plan import build_plan
+from martths_jax.campaign.store import RunFolder
 from martths_jax.files import LONGEST_NAME, name_problems, safe_name
-from martths_jax.study.config import make_config
-from martths_jax.study.export import write_csv
-from martths_jax.study.plan import build_plan
 from martths_jax.study.runner import header, write_results
 from martths_jax.study.signals import group
-from martths_jax.study.store import RunFolder
 from martths_jax.study.summary import Table
 from martths_jax.text import counted, csv_cell, csv_field, markdown_text
 from tests.study.places import short_motion, small

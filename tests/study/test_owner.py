@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from martths_jax import InputError, claims
+from martths_jax.campaign.owner import Owner, door, owned, owners
 from martths_jax.files import atomic, sweep
 from martths_jax.study import run_study
-from martths_jax.study.owner import Owner, door, owned, owners
 from tests.study.places import ONE_BLOCK, result_bytes, small
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,7 +24,8 @@ PAUSED = """
 import os, signal, sys
 sys.path.insert(0, {root!r})
 from martths_jax import InputError
-from martths_jax.study import Reporter, provenance, run_study
+from martths_jax.campaign import provenance
+from martths_jax.study import Reporter, run_study
 from tests.study.places import small, ONE_BLOCK
 provenance.git_commit = lambda: "0000000"
 
@@ -77,7 +78,7 @@ def test_a_dead_owner_is_no_owner(tmp_path):
     code = (
         "import os; from pathlib import Path\n"
         "from martths_jax.files import scratch\n"
-        "from martths_jax.study.owner import owned\n"
+        "from martths_jax.campaign.owner import owned\n"
         f"folder = Path({str(tmp_path)!r})\n"
         "with owned(folder, 'dies'), scratch(folder / 'study.nc') as part:\n"
         "    part.write_text('half')\n"
@@ -126,7 +127,7 @@ def test_shares_are_not_extended_under_each_other(tmp_path):
 
 
 def test_a_door_that_nobody_leaves(tmp_path, monkeypatch):
-    monkeypatch.setattr("martths_jax.study.owner.PATIENCE", 0.1)
+    monkeypatch.setattr("martths_jax.campaign.owner.PATIENCE", 0.1)
     with door(tmp_path), pytest.raises(InputError, match="being changed by another process"):
         with door(tmp_path):
             pass

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from martths_jax import InputError
+from martths_jax.campaign.distributed import join
 from martths_jax.study import Reporter, merge_runs, open_study, run_study
-from martths_jax.study.distributed import join
 from martths_jax.study.runner import share_of
 from tests.study.places import ONE_BLOCK, result_bytes, short_motion, small
 
@@ -22,8 +22,9 @@ ROOT = Path(__file__).resolve().parents[2]
 WORKER = """
 import sys
 sys.path.insert(0, {root!r})
-from martths_jax.study import provenance, run_study
-from martths_jax.study.distributed import join
+from martths_jax.campaign import provenance
+from martths_jax.study import run_study
+from martths_jax.campaign.distributed import join
 from tests.study.places import ONE_BLOCK, small
 provenance.git_commit = lambda: "0000000"
 met = join("localhost:{port}", 2, {number})

@@ -8,10 +8,10 @@ import psutil
 import pytest
 
 from martths_jax import InputError, checks, resources
+from martths_jax.campaign import memory as study_memory
+from martths_jax.campaign.memory import choose_chunk
 from martths_jax.motions import checks as motion_checks
 from martths_jax.resources import available_memory
-from martths_jax.study import memory as study_memory
-from martths_jax.study.memory import choose_chunk
 
 MACHINE = 64e9
 

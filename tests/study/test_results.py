@@ -14,17 +14,17 @@ from scipy.io import loadmat
 from typer.testing import CliRunner
 
 from martths_jax import InputError
+from martths_jax.campaign import memory as memory_module
+from martths_jax.campaign.dataset import read_dataset, write_dataset
+from martths_jax.campaign.export import write_mat
+from martths_jax.campaign.files import writing
+from martths_jax.campaign.memory import choose_chunk, lane_bytes
+from martths_jax.campaign.progress import Lines, Tally
+from martths_jax.campaign.store import FORMAT
 from martths_jax.cli import app
 from martths_jax.indices import NAMES
-from martths_jax.study import memory as memory_module
 from martths_jax.study import run_study
-from martths_jax.study.dataset import read_dataset, write_dataset
-from martths_jax.study.export import write_mat
-from martths_jax.study.files import writing
-from martths_jax.study.memory import choose_chunk, lane_bytes
-from martths_jax.study.progress import Lines, Tally
 from martths_jax.study.signals import group
-from martths_jax.study.store import FORMAT
 from tests.study.places import SAMPLES, short_motion, small
 
 

@@ -22,10 +22,10 @@ from martths_jax import (
     indices,
     simulate,
 )
+from martths_jax.campaign.header import sealed
+from martths_jax.campaign.store import RunFolder
 from martths_jax.simulation import LANES
 from martths_jax.study import Reporter, open_study, run_study
-from martths_jax.study.header import sealed
-from martths_jax.study.store import RunFolder
 from tests.study.places import ONE_BLOCK, result_bytes, short_motion, small
 
 
@@ -83,7 +83,8 @@ def test_the_numbers_are_those_of_simulate(whole, tmp_path):
 VICTIM = """
 import sys
 sys.path.insert(0, {root!r})
-from martths_jax.study import provenance, run_study
+from martths_jax.campaign import provenance
+from martths_jax.study import run_study
 provenance.git_commit = lambda: "0000000"
 from tests.study.places import small, ONE_BLOCK
 run_study(small({folder!r}, trials=300, memory_gb=ONE_BLOCK))

@@ -7,8 +7,9 @@ import sys
 import pytest
 
 from martths_jax import ADFC, InputError
-from martths_jax.study import Reporter, run_study, sources
-from martths_jax.study.engine_modules import ENGINE_MODULES
+from martths_jax.campaign import sources
+from martths_jax.campaign.engine_modules import ENGINE_MODULES
+from martths_jax.study import Reporter, run_study
 from tests.study.places import short_motion, small
 
 CONTROLLER = '''
@@ -169,7 +170,7 @@ def test_the_package_s_own_source_is_read_quickly_and_right():
 def test_every_module_that_decides_a_number_is_listed():
     """All modules of this package that the engine imports, but for those named here."""
     code = (
-        "import sys, martths_jax.study.engine, martths_jax.sweep.lanes\n"
+        "import sys, martths_jax.campaign.engine, martths_jax.sweep.lanes\n"
         "print(*(m for m in sys.modules if m.startswith('martths_jax.')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -6,8 +6,8 @@ import xarray as xr
 from scipy import stats
 
 from martths_jax import published
+from martths_jax.campaign.statistics import compare, percentile, proportion
 from martths_jax.indices import NAMES
-from martths_jax.study.statistics import compare, percentile, proportion
 from martths_jax.study.summary import number, summarise
 
 

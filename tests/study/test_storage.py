@@ -12,10 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from martths_jax import InputError
-from martths_jax.study import Reporter, machine, merge_runs, open_study, run_study, store
-from martths_jax.study.dataset import read_dataset, write_dataset
-from martths_jax.study.files import write_text
-from martths_jax.study.parts import Damaged, Foreign, check_part, part_bytes, read_part
+from martths_jax.campaign import machine, store
+from martths_jax.campaign.dataset import read_dataset, write_dataset
+from martths_jax.campaign.files import write_text
+from martths_jax.campaign.parts import Damaged, Foreign, check_part, part_bytes, read_part
+from martths_jax.study import Reporter, merge_runs, open_study, run_study
 from tests.study.places import result_bytes, short_motion, small
 
 TRIALS = 20

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from martths_jax import InputError
-from martths_jax.study.config import make_config
+from martths_jax.campaign.config import make_config
 from martths_jax.sweep import make_sweep, run_sweep
 from martths_jax.sweep.axes import SCALARS, axis_values
 from martths_jax.sweep.grid import cell_numbers, job_config, overlap

@@ -21,12 +21,12 @@ from martths_jax import (
     load_motion,
     simulate,
 )
+from martths_jax.campaign.statistics import percentile
 from martths_jax.cli import app
 from martths_jax.indices import NAMES
 from martths_jax.motions import Motion
 from martths_jax.report.beside import open_beside
 from martths_jax.study import Reporter
-from martths_jax.study.statistics import percentile
 from martths_jax.sweep import open_sweep, run_sweep
 from tests.study.places import short_motion
 

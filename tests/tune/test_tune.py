@@ -18,9 +18,9 @@ from martths_jax import (
     load_motion,
     loop,
 )
+from martths_jax.campaign.owner import owned
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import reference_response
-from martths_jax.study.owner import owned
 from martths_jax.tune import Options, tune
 from martths_jax.tune import gradient as gradients
 from martths_jax.tune import search as searching

@@ -1,0 +1,1 @@
+"""Arrays in, arrays out: algebra that knows no actuator and no frame."""

@@ -1,0 +1,1 @@
+"""What all campaigns share: settings, plan, the folder that resumes, progress, results on disk."""

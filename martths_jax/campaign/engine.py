@@ -1,0 +1,188 @@
+"""The one place where a study touches the simulation's inside: chunks of trials through the loop.
+
+``simulate`` would do, but it draws the noise anew in every call; here the noise of a chunk is drawn
+once and serves every motion and controller.  The numbers are the same to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from martths_jax.campaign.plan import Plan
+from martths_jax.errors import InputError
+from martths_jax.indices import NAMES, final_indices
+from martths_jax.runtime import check_precision
+from martths_jax.simulation import (
+    LANES,
+    Setup,
+    draw_on,
+    fill,
+    prepare,
+    reference_response,
+    run_block,
+)
+from martths_jax.watch import NEVER, Status, status_of
+
+#: First samples that a ``Watch`` holds, by the name they have in the results.
+FIRSTS = ("saturated", "command", "stroke", "nonfinite")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a chunk of T trials gave under one controller and motion.
+
+    Attributes:
+        value: (T, 24) indices, NaN where the trial diverged.
+        status: (T,) ``Status``.
+        first: (T, 4, 2) first samples at which ``FIRSTS`` happened, NaN for never; by actuator.
+        volt_peak: (T, 2) largest valve commands [V].
+        held: (T,) number of fits that the controller did not use.
+    """
+
+    value: np.ndarray
+    status: np.ndarray
+    first: np.ndarray
+    volt_peak: np.ndarray
+    held: np.ndarray
+
+    def __getitem__(self, which) -> Outcome:
+        return Outcome(*(x[which] for x in self.arrays().values()))
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The arrays by name."""
+        return dict(vars(self))
+
+    @classmethod
+    def join(cls, parts: list[Outcome]) -> Outcome:
+        """Trials after trials."""
+        columns = zip(*(p.arrays().values() for p in parts), strict=True)
+        return cls(*(np.concatenate(x) for x in columns))
+
+
+def choose_devices(wanted: int | None) -> list:
+    """Devices of this process to run on.
+
+    Raises:
+        InputError: if there are fewer than `wanted`.
+    """
+    local = jax.local_devices()
+    if wanted is not None and wanted > len(local):
+        raise InputError(
+            f"Argument `devices` must be at most {len(local)}, the devices JAX started with, but "
+            f"got {wanted}; set MARTHS_DEVICES={wanted} before Python starts."
+        )
+    return local[:wanted]
+
+
+class Engine:
+    """Runs chunks of a plan's trials on some devices.
+
+    Args:
+        plan: what to run.
+        devices: of this process.
+        chunk: trials that share one drawing of noise, a multiple of a block.
+    """
+
+    def __init__(self, plan: Plan, devices: list, chunk: int):
+        self.plan, self.devices, self.chunk = plan, devices, chunk
+        self.setups: dict[tuple[str, str], Setup] = {}
+        self.longest = max(m.acceleration.size for m in plan.motions)
+        self._noise: dict[bytes, list] = {}
+
+    @property
+    def block(self) -> int:
+        """Trials that run side by side."""
+        return LANES * len(self.devices)
+
+    def setup(self, controller: str, motion: str) -> Setup:
+        """What all blocks of a controller and motion share; built when first asked for."""
+        key = controller, motion
+        if key not in self.setups:
+            chosen = next(m for m in self.plan.motions if m.name == motion)
+            ready, own = prepare(self.plan.controllers[controller], self.plan.benchmark, 1)
+            same = next((s for (_, m), s in self.setups.items() if m == motion), None)
+            ground = same.ground if same else jnp.asarray(chosen.acceleration)
+            response = same.reference if same else reference_response(self.plan.benchmark, ground)
+            self.setups[key] = Setup(self.plan.benchmark, ready, own, ground, response)
+        return self.setups[key]
+
+    def warm(self, controllers: Iterable[str], trial: np.ndarray) -> None:
+        """Compile the programs of these controllers side by side; `trial`: the first chunk."""
+        motion = self.plan.motions[0].name
+        setups = [self.setup(c, motion) for c in dict.fromkeys(controllers)]
+        noise, which = self.noise(trial)[0], np.arange(min(trial.size, self.block))
+        plants = self.plan.draws.plants(trial)
+
+        def compile_one(setup: Setup) -> None:
+            check_precision()  # a block `with jax.enable_x64()` does not reach this thread
+            # A motion of one sample: the programs do not depend on its length.
+            brief = replace(setup, ground=setup.ground[:1], reference=setup.reference[:1])
+            run_block(brief, plants, noise, which, self.devices, keep=False, retry=False)
+
+        with ThreadPoolExecutor(len(setups)) as pool:
+            list(pool.map(compile_one, setups))
+
+    def noise(self, trial: np.ndarray) -> list[jax.Array]:
+        """Noise of a chunk, block by block, for the longest motion; forgets the chunk before."""
+        key = trial.tobytes()
+        if key not in self._noise:
+            self._noise = {}  # free the old chunk's memory before drawing
+            self._noise[key] = self._drawn(trial, self.devices)
+        return self._noise[key]
+
+    def _drawn(self, trial: np.ndarray, devices: list) -> list:
+        size = LANES * len(devices)
+        positions = np.arange(trial.size)
+        return [
+            draw_on(devices, self.plan.noise, trial[fill(positions[i : i + size], size)],
+                    self.longest, self.plan.benchmark.fs)
+            for i in range(0, trial.size, size)
+        ]  # fmt: skip
+
+    def run(self, controller: str, motion: str, trial: np.ndarray) -> Outcome:
+        """Run the trials (T,) of a chunk."""
+        setup = self.setup(controller, motion)
+        plants = self.plan.draws.plants(trial)
+        blocks = []
+        for i, noise in enumerate(self.noise(trial)):
+            which = np.arange(i * self.block, min((i + 1) * self.block, trial.size))
+            sums, watch, _ = run_block(setup, plants, noise, which, self.devices, keep=False)
+            blocks.append(self.outcome(setup, sums, watch, trial[which]))
+        return Outcome.join(blocks)
+
+    def signals(self, controller: str, motion: str, trial: np.ndarray, device) -> dict:
+        """Signals (T, N, ...) of at most ``LANES`` trials, run again on one device."""
+        setup = self.setup(controller, motion)
+        noise = self._drawn(trial, [device])[0]
+        _, _, signals = run_block(
+            setup,
+            self.plan.draws.plants(trial),
+            noise,
+            np.arange(trial.size),
+            [device],
+            keep=True,
+        )
+        return signals
+
+    def outcome(self, setup: Setup, sums, watch, trial: np.ndarray) -> Outcome:
+        """What the sums and watch of a block with the given trials (T,) come to."""
+        # As many trials in every block, so that the few operations here compile once.
+        lanes = fill(np.arange(trial.size), self.block)
+        sums, watch = jax.tree.map(lambda x: np.asarray(x)[..., lanes], (sums, watch))
+        status = np.asarray(status_of(watch, sums))
+        found = final_indices(sums, status >= Status.DIVERGED)
+        first = np.stack([np.asarray(getattr(watch, name)) for name in FIRSTS])
+        whole = Outcome(
+            value=np.stack([found[name] for name in NAMES], axis=-1),
+            status=status.astype(np.int32),
+            first=np.moveaxis(np.where(first >= NEVER, np.nan, first), -1, 0),
+            volt_peak=np.asarray(watch.volt_peak).T,
+            held=np.asarray(watch.held).astype(np.int32),
+        )
+        return whole[: trial.size]

@@ -1,0 +1,1 @@
+"""Controllers and estimators: what they are (``base``), and the ones there are."""

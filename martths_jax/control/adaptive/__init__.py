@@ -1,0 +1,1 @@
+"""The pieces of adaptive controllers, each exchangeable."""

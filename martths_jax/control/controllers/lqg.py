@@ -1,0 +1,194 @@
+"""LQG tracking control of the benchmark: state feedback on the estimate plus integral action."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy import linalg
+
+from martths_jax.benchmark import Benchmark
+from martths_jax.control.base import Controller, Decision
+from martths_jax.control.design.closed_loop import lowest_stable_rate, nominal_radius
+from martths_jax.control.estimators import design_kalman
+from martths_jax.errors import argument_error, as_numbers
+from martths_jax.runtime import check_runtime
+from martths_jax.structure.modal import contract
+
+#: What is integrated -> weights fitted to Table 4's LQG column with it (experiments/calibrate_lqg).
+FITTED = {
+    "estimate": {
+        "e": (10**9.902, 10**3.753),
+        "r": (1.0, 10**-1.009),
+        "y": (10**0.784, 10**1.566),
+        "q": 3e-3,
+    },
+    "measured": {
+        "e": (10**9.766, 10**3.738),
+        "r": (1.0, 10**-0.907),
+        "y": (10**0.699, 10**1.580),
+        "q": 3e-5,
+    },
+}
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class LQG(Controller):
+    """u(k) = -K_z z_hat(k) - K_e e(k), with e(k) = e(k-1) + dt (x_a(k) - x(k)).
+
+    Attributes:
+        K_z: (2, 2, m) or (2, 2, m, T) gain on the estimated plant state, slot by slot.
+        K_e: (2, 2) or (2, 2, T) gain on the integral of the tracking error [1/s].
+        estimator: the Kalman filter.
+        weights: what the gains were designed from, for the record.
+        error: what x is, and so which error is integrated: the ``measured`` strokes x_m, or the
+            filter's ``estimate`` x_hat of them.
+    """
+
+    K_z: jax.Array
+    K_e: jax.Array
+    estimator: Any
+    weights: tuple = field(default=(), metadata={"static": True})
+    error: str = field(default="measured", metadata={"static": True})
+
+    name = "lqg"
+    shared_axes = MappingProxyType({"K_z": 3, "K_e": 2})
+
+    @classmethod
+    def design(
+        cls,
+        benchmark,
+        *,
+        e: tuple[float, float] | None = None,
+        r: tuple[float, float] | None = None,
+        y: tuple[float, float] | None = None,
+        q: float | None = None,
+        error: str = "estimate",
+        allow_unstable: bool = False,
+    ) -> LQG:
+        """Gains from the continuous-time Riccati equation of the plant with integral action.
+
+        Minimises the integral of y_1 x_1^2 + y_2 x_2^2 + e' diag(e) e + u' diag(r) u for the
+        augmented state (z, e), e' = x_a - C z.
+
+        Args:
+            benchmark: gives the nominal plant and the sensor noise.
+            e: weights of the two integrated errors [1/s^2].
+            r: weights of the two commands [-].
+            y: weights of the two strokes [-].
+            q: process noise of the Kalman filter [mm^2].
+            error: integrate that of the ``estimate`` or of the ``measured`` strokes.
+            allow_unstable: return a design whose loop runs away on the benchmark's own plant, too.
+
+        The published weights are not known.  Those left out are ``FITTED`` for `error`: the
+        least-squares fit of e, r and y to Table 4's LQG column, which says next to nothing of q.
+        The Riccati equation is the same for both errors, as it knows no noise.
+
+        Raises:
+            InputError: if a weight is not positive (y may be zero) or traced, no solution exists,
+                `error` is neither of the two, or the loop is unstable on the benchmark's own plant
+                at its sampling rate.
+        """
+        check_runtime()
+        if not isinstance(benchmark, Benchmark):
+            got = type(benchmark).__name__
+            raise argument_error("benchmark", "be a Benchmark", got, "Use build_benchmark().")
+        if error not in FITTED:
+            raise argument_error("error", f"be one of {sorted(FITTED)}", repr(error))
+        given = {"e": e, "r": r, "y": y, "q": q}
+        given = FITTED[error] | {name: w for name, w in given.items() if w is not None}
+        e, r, y, q = (given[name] for name in "eryq")
+        check_weights(e, r, y, q)
+        A, B, C = benchmark.plant_continuous
+        n = A.shape[0]
+        A_aug = np.block([[A, np.zeros((n, 2))], [-C, np.zeros((2, 2))]])
+        B_aug = np.vstack([B, np.zeros((2, 2))])
+        Q = linalg.block_diag(C.T @ np.diag(y) @ C, np.diag(e))
+        try:
+            with np.errstate(all="ignore"):
+                X = linalg.solve_continuous_are(A_aug, B_aug, Q, np.diag(r))
+        except (np.linalg.LinAlgError, ValueError) as reason:
+            raise argument_error(
+                "e, r, y", "give a solvable Riccati equation", f"e={e}, r={r}, y={y} ({reason})"
+            ) from None
+        K = np.linalg.solve(np.diag(r), B_aug.T @ X)
+        K_z = np.swapaxes(K[:, :n].reshape(2, n // 2, 2), 1, 2)
+        with jax.ensure_compile_time_eval():  # the numbers are known, under jit too
+            made = cls(
+                K_z=jnp.asarray(K_z),
+                K_e=jnp.asarray(K[:, n:]),
+                estimator=design_kalman(benchmark.plant_model, q, benchmark.r_mm2),
+                weights=(("e", tuple(e)), ("r", tuple(r)), ("y", tuple(y)), ("q", float(q))),
+                error=error,
+            )
+        if not allow_unstable:
+            refuse_unstable(benchmark, made, q)
+        return made
+
+    def problems(self, benchmark):
+        if self.error in FITTED:
+            return []
+        return [str(argument_error("error", f"be one of {sorted(FITTED)}", repr(self.error)))]
+
+    def prepare(self, benchmark):
+        # Designs that differ in numbers only share a program, and can be mixed trial by trial.
+        return replace(self, weights=())
+
+    def init(self, trials):
+        return jnp.zeros((2, trials))
+
+    def step(self, state, seen):
+        reached = seen.measured_mm if self.error == "measured" else seen.estimate_mm
+        error = state + seen.dt * (seen.target_mm - reached)
+        command = -contract(self.K_z, seen.state, axes=2) - contract(self.K_e, error)
+        return error, Decision(command_mm=command, signals={"error_integral": error})
+
+
+def check_weights(e, r, y, q) -> None:
+    """Refuse weights of ``LQG.design`` that are no numbers or out of range.
+
+    Raises:
+        InputError: naming the first such weight.
+    """
+    for name, given, shape, low in (
+        ("e", e, (2,), 0.0), ("r", r, (2,), 0.0), ("y", y, (2,), -1e-300), ("q", q, (), 0.0),
+    ):  # fmt: skip
+        count = "two" if shape else "a"
+        wanted = f"be {count} {'positive' if low == 0 else 'non-negative'} number{'s' * len(shape)}"
+        if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(given)):
+            raise argument_error(
+                name, wanted, "a traced value",
+                "martths_jax.control.design.lqg.lqg_from_weights can be traced and differentiated.",
+            )  # fmt: skip
+        values = as_numbers(given)
+        if values.shape != shape or not np.all(np.isfinite(values) & (values > low)):
+            raise argument_error(name, wanted, repr(given)[:80])
+
+
+def refuse_unstable(benchmark, made: LQG, q: float) -> None:
+    """Refuse a design whose loop runs away on the plant it was made for.
+
+    Raises:
+        InputError: with the lowest sampling rate that holds, where that is the cause.
+    """
+    step = jax.tree.map(np.asarray, replace(made, estimator=None)).step
+    radius = nominal_radius(benchmark, made.estimator.filter_gain, step)
+    if radius < 1:
+        return
+    lowest = lowest_stable_rate(benchmark, q, step)
+    remedy = "Raise r or lower e"
+    if lowest is not None:
+        remedy = (
+            f"With these weights the lowest sampling rate that holds is {lowest:g} Hz; raise fs"
+        )
+    raise argument_error(
+        "e, r, y, q",
+        "give a loop that is stable on the nominal plant",
+        f"one with a pole of magnitude {radius:.6g} at {benchmark.fs:g} Hz",
+        f"{remedy}, or design with allow_unstable=True to see it run away.",
+    )

@@ -1,0 +1,1 @@
+"""Controller and filter design as differentiable functions of their weights."""

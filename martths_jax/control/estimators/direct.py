@@ -1,0 +1,28 @@
+"""No filter: the estimate is the measurement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+
+from martths_jax.control.base import Estimator
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class DirectMeasurement(Estimator):
+    """x_hat(k) = x_m(k): for ideal sensors, and for controllers that take the noise as it comes."""
+
+    def init(self, trials):
+        """Nothing to remember, (2, 0, T)."""
+        return jnp.zeros((2, 0, trials))
+
+    def correct(self, predicted, measured_mm):
+        """The measurement itself."""
+        return predicted, measured_mm
+
+    def predict(self, state, command_mm):
+        """Nothing to predict."""
+        return state
