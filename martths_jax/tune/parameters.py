@@ -11,8 +11,8 @@ import numpy as np
 from martths_jax.benchmark import Benchmark
 from martths_jax.control.controllers import ADFC, LQG, Controller
 from martths_jax.control.controllers.adfc import GUARD_PULL
-from martths_jax.control.controllers.lqg import FITTED
-from martths_jax.control.design.lqg import WEIGHTS, kalman_gain, lqg_from_weights
+from martths_jax.control.controllers.lqg import FITTED, lqg_from_weights
+from martths_jax.control.design.lqg import WEIGHTS, kalman_gain
 from martths_jax.control.estimators import KalmanFilter
 from martths_jax.errors import argument_error
 

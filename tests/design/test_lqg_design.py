@@ -7,7 +7,8 @@ import pytest
 
 from martths_jax import LQG, build_benchmark
 from martths_jax.control.controllers import ADFC
-from martths_jax.control.design.lqg import WEIGHTS, lqg_from_weights, tracking_gains
+from martths_jax.control.controllers.lqg import lqg_from_weights
+from martths_jax.control.design.lqg import WEIGHTS, tracking_gains
 from martths_jax.control.estimators import design_kalman
 
 START = {"e1": 9.343, "e2": 3.648, "r2": -0.913, "y1": 2.836, "y2": 0.921, "q": -1.82}

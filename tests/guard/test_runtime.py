@@ -25,7 +25,8 @@ from martths_jax import (
     simulate,
 )
 from martths_jax.algebra.riccati import care, dare
-from martths_jax.control.design.lqg import WEIGHTS, kalman_gain, lqg_from_weights
+from martths_jax.control.controllers.lqg import lqg_from_weights
+from martths_jax.control.design.lqg import WEIGHTS, kalman_gain
 from martths_jax.control.estimators import design_kalman
 from martths_jax.plant import NOMINAL_HZ
 from martths_jax.sensitivity import run_sensitivity

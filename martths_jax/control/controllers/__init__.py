@@ -1,8 +1,22 @@
-"""Controllers: passthrough, LQG and ADFC, behind one protocol (see ``base``)."""
+"""Controllers, one file each with its ``ENTRY``; ``ENTRIES`` lists them."""
 
 from martths_jax.control.base import Controller, Decision, Observation
+from martths_jax.control.controllers import adfc, lqg, passthrough
 from martths_jax.control.controllers.adfc import ADFC
+from martths_jax.control.controllers.frozen import FrozenFeedforward
 from martths_jax.control.controllers.lqg import LQG
 from martths_jax.control.controllers.passthrough import Passthrough
 
-__all__ = ["ADFC", "LQG", "Controller", "Decision", "Observation", "Passthrough"]
+#: What can be named without a path, in the order of help texts.
+ENTRIES = (lqg.ENTRY, adfc.ENTRY, passthrough.ENTRY)
+
+__all__ = [
+    "ADFC",
+    "ENTRIES",
+    "LQG",
+    "Controller",
+    "Decision",
+    "FrozenFeedforward",
+    "Observation",
+    "Passthrough",
+]

@@ -8,6 +8,7 @@ same model applied to the target strokes.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
@@ -21,6 +22,7 @@ from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES, TAPS,
 from martths_jax.control.adaptive.inverse import nominal_inverse
 from martths_jax.control.base import Controller, Decision, DelayLine, Signal
 from martths_jax.control.controllers.frozen import FrozenFeedforward
+from martths_jax.control.entry import Derived, Entry, Parameter
 from martths_jax.control.estimators import design_kalman
 from martths_jax.errors import argument_error, raise_all
 from martths_jax.resources import available_memory
@@ -77,9 +79,10 @@ class ADFC(Controller):
     name = "adfc"
     adapts = True
     signals = (
-        Signal("C_A", ("coefficient", "actuator"), "1", "adaptive coefficients, scaled"),
+        Signal("C_A", ("coefficient", "actuator"), "1",
+               "adaptive coefficients in scaled derivatives"),
         Signal("held", (), "1", "fits that were not used so far"),
-    )
+    )  # fmt: skip
     shared_axes = MappingProxyType({"no": 0, "pull": 0, "q": 0, "start": 2, "anchor": 2})
 
     def __post_init__(self):
@@ -213,6 +216,42 @@ class ADFC(Controller):
         sum is at most two lengths of the line old.
         """
         return state | {"rows": state["new"], "new": jax.tree.map(jnp.zeros_like, state["new"])}
+
+
+def _overlap(nb: int, value: float) -> int:
+    return min(math.floor(value * nb + 0.5), nb - 1)
+
+
+ENTRY = Entry(
+    name="adfc",
+    controller=ADFC,
+    label="ADFC",
+    paper="Calayir, Tao & Mercan 2025, Actuators 14(11), 525",
+    parameters=(
+        Parameter("nb", "Nb", "buffer length", 1024, "samples", 9, whole=True, kind="static"),
+        Parameter("no", "No", "overlap", 1023, "samples", 0, whole=True),
+        Parameter("pull", "lambda", "pull", None, "mm^2", 0.0, kind="tunable", axis="lambda"),
+        Parameter("q", "q", "process noise", 3e-5, "mm^2", 0.0, above=True, kind="tunable"),
+        Parameter("towards", "", "what the pull goes to", None, choices=ANCHORS, kind="static"),
+        Parameter("solver", "", "solver", "ldl", choices=tuple(ls.SOLVERS), kind="static"),
+    ),
+    derived=(
+        # A fraction of 1 is every sample, No = Nb - 1.
+        Derived("no_fraction", "no", lambda v, own, fs: _overlap(own["nb"], v),
+                "overlap No / Nb", "1", 0.0, 1.0),
+        Derived("hop", "no", lambda v, own, fs: own["nb"] - int(v),
+                "hop Nb - No", "samples", 1, whole=True),
+        Derived("fb", "no", lambda v, own, fs: own["nb"] - math.floor(fs / v + 0.5),
+                "update rate f_b", "Hz", 0.0, above=True),
+    ),
+    tuned=(
+        Parameter("pull", "lambda", "pull", GUARD_PULL, "mm^2", 0.0, above=True),
+        Parameter("q", "q", "process noise", 3e-5, "mm^2", 0.0, above=True),
+    ),
+    traced=lambda benchmark, **values: ADFC(towards="inverse", **values).prepare(benchmark),
+    settings_from=lambda values: {**values, "towards": "inverse"},
+    look=1,
+)  # fmt: skip
 
 
 def choose(use, new, old):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
@@ -14,9 +15,11 @@ from scipy import linalg
 from martths_jax.benchmark import Benchmark
 from martths_jax.control.base import Controller, Decision
 from martths_jax.control.design.closed_loop import lowest_stable_rate, nominal_radius
-from martths_jax.control.estimators import design_kalman
+from martths_jax.control.design.lqg import WEIGHTS, kalman_gain, tracking_gains
+from martths_jax.control.entry import Entry, Parameter
+from martths_jax.control.estimators import KalmanFilter, design_kalman
 from martths_jax.errors import argument_error, as_numbers
-from martths_jax.runtime import check_runtime
+from martths_jax.runtime import check_precision, check_runtime
 from martths_jax.structure.modal import contract
 
 #: What is integrated -> weights fitted to Table 4's LQG column with it (experiments/calibrate_lqg).
@@ -147,6 +150,80 @@ class LQG(Controller):
         error = state + seen.dt * (seen.target_mm - reached)
         command = -contract(self.K_z, seen.state, axes=2) - contract(self.K_e, error)
         return error, Decision(command_mm=command, signals={"error_integral": error})
+
+
+def _pairs(w) -> dict:
+    """Settings of ``LQG.design`` that mean the same as the tuned numbers."""
+    # What a tuning has found is shown even if it runs away in the end.
+    return {"e": (w["e1"], w["e2"]), "r": (1.0, w["r2"]), "y": (w["y1"], w["y2"]), "q": w["q"],
+            "allow_unstable": True}  # fmt: skip
+
+
+def _tuned() -> tuple[Parameter, ...]:
+    found = FITTED["estimate"]
+    (e1, e2), (r1, r2), (y1, y2) = (found[name] for name in "ery")
+    starts = {"e1": e1, "e2": e2, "r2": r2 / r1, "y1": y1, "y2": y2, "q": found["q"]}
+    units = {"e1": "1/s^2", "e2": "1/s^2", "q": "mm^2"}
+    return tuple(
+        Parameter(name, default=starts[name], unit=units.get(name, "1"), low=0.0, above=True)
+        for name in WEIGHTS
+    )
+
+
+ENTRY = Entry(
+    name="lqg",
+    controller=LQG,
+    make=LQG.design,
+    label="LQG",
+    paper="Condori Uribe et al. 2023, sample controller of the benchmark",
+    parameters=(
+        Parameter("e", "e", "weights of the integrated errors", None, "1/s^2", 0.0, above=True,
+                  size=2),
+        Parameter("r", "r", "weights of the commands", None, "1", 0.0, above=True, size=2),
+        Parameter("y", "y", "weights of the strokes", None, "1", 0.0, size=2),
+        Parameter("q", "q", "process noise", None, "mm^2", 0.0, above=True),
+        Parameter("error", "", "error that is integrated", "estimate", choices=tuple(FITTED),
+                  kind="static"),
+        Parameter("allow_unstable", "", "take designs that run away", False, kind="static"),
+    ),
+    tuned=_tuned(),
+    traced=lambda benchmark, **values: lqg_from_weights(
+        benchmark, {name: jnp.log10(value) for name, value in values.items()}
+    ),
+    settings_from=_pairs,
+    look=0,
+)  # fmt: skip
+
+
+def lqg_from_weights(
+    benchmark: Benchmark, log_weights: Mapping[str, jax.Array], error: str = "estimate"
+) -> LQG:
+    """LQG controller from log10 of its weights, in pure JAX.
+
+    The same design as ``LQG.design``, which checks its arguments and uses SciPy on the host; this
+    one can be traced, differentiated and batched.
+
+    Args:
+        benchmark: gives the nominal plant and the sensor noise.
+        log_weights: log10 of each of ``WEIGHTS``: integrated errors e1, e2 [1/s^2], second command
+            r2, strokes y1, y2 [-], process noise q of the filter [mm^2].  Scalars.
+        error: which one is integrated, as in ``LQG``.
+
+    Returns:
+        The controller of ``LQG.design`` for e = (e1, e2), r = (1, r2), y = (y1, y2), q, `error`.
+    """
+    check_precision()
+    w = {name: 10.0 ** jnp.asarray(log_weights[name], dtype=float) for name in WEIGHTS}
+    C = benchmark.plant_continuous[2]
+    n = C.shape[1]
+    blank, one = jnp.zeros((n, 2)), jnp.ones(())
+    strokes = C.T @ (jnp.stack([w["y1"], w["y2"]])[:, None] * C)
+    errors = jnp.eye(2) * jnp.stack([w["e1"], w["e2"]])
+    Q = jnp.block([[strokes, blank], [blank.T, errors]])
+    R = jnp.eye(2) * jnp.stack([one, w["r2"]])
+    K_z, K_e = tracking_gains(benchmark, Q, R)
+    estimator = KalmanFilter(benchmark.plant_model, kalman_gain(benchmark, w["q"]))
+    return LQG(K_z=K_z, K_e=K_e, estimator=estimator, error=error)
 
 
 def check_weights(e, r, y, q) -> None:

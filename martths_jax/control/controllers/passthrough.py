@@ -8,6 +8,7 @@ from typing import Any
 import jax
 
 from martths_jax.control.base import Controller, Decision
+from martths_jax.control.entry import Entry, Parameter
 from martths_jax.control.estimators import DirectMeasurement, design_kalman
 
 
@@ -39,3 +40,13 @@ class Passthrough(Controller):
 
     def step(self, state, seen):
         return state, Decision(command_mm=seen.target_mm)
+
+
+ENTRY = Entry(
+    name="passthrough",
+    controller=Passthrough,
+    paper="no compensation: what every other is compared with",
+    parameters=(
+        Parameter("q", "q", "process noise", None, "mm^2", 0.0, above=True, kind="static"),
+    ),
+)

@@ -1,53 +1,17 @@
-"""LQG tracking control as a differentiable function of its weights.
-
-The same design as ``LQG.design``, in pure JAX: it can be traced, differentiated and batched, where
-the class method checks its arguments and uses SciPy on the host.
-"""
+"""Gains of LQG tracking control and of its filter as differentiable functions of their weights."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import jax
 import jax.numpy as jnp
 
 from martths_jax.algebra.riccati import care, dense_kalman_gain, solve
 from martths_jax.benchmark import Benchmark
-from martths_jax.control.controllers.lqg import LQG
-from martths_jax.control.estimators import KalmanFilter
 from martths_jax.runtime import check_precision
 from martths_jax.structure.modal import to_dense
 
 #: Free weights of the design; that of the first command is 1, since only ratios matter.
 WEIGHTS = ("e1", "e2", "r2", "y1", "y2", "q")
-
-
-def lqg_from_weights(
-    benchmark: Benchmark, log_weights: Mapping[str, jax.Array], error: str = "estimate"
-) -> LQG:
-    """LQG controller from log10 of its weights.
-
-    Args:
-        benchmark: gives the nominal plant and the sensor noise.
-        log_weights: log10 of each of ``WEIGHTS``: integrated errors e1, e2 [1/s^2], second command
-            r2, strokes y1, y2 [-], process noise q of the filter [mm^2].  Scalars.
-        error: which one is integrated, as in ``LQG``.
-
-    Returns:
-        The controller of ``LQG.design`` for e = (e1, e2), r = (1, r2), y = (y1, y2), q, `error`.
-    """
-    check_precision()
-    w = {name: 10.0 ** jnp.asarray(log_weights[name], dtype=float) for name in WEIGHTS}
-    C = benchmark.plant_continuous[2]
-    n = C.shape[1]
-    blank, one = jnp.zeros((n, 2)), jnp.ones(())
-    strokes = C.T @ (jnp.stack([w["y1"], w["y2"]])[:, None] * C)
-    errors = jnp.eye(2) * jnp.stack([w["e1"], w["e2"]])
-    Q = jnp.block([[strokes, blank], [blank.T, errors]])
-    R = jnp.eye(2) * jnp.stack([one, w["r2"]])
-    K_z, K_e = tracking_gains(benchmark, Q, R)
-    estimator = KalmanFilter(benchmark.plant_model, kalman_gain(benchmark, w["q"]))
-    return LQG(K_z=K_z, K_e=K_e, estimator=estimator, error=error)
 
 
 def tracking_gains(
