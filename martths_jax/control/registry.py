@@ -100,7 +100,8 @@ def _named(text: str) -> Guest:
     near = difflib.get_close_matches(text, names(), n=3)
     hint = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(names())}"
     raise InputError(
-        f"Controller {text!r} is unknown; {hint}.  One of your own is {WAYS.removeprefix('a name, ')}."
+        f"Controller {text!r} is unknown; {hint}.  One of your own is "
+        "package.module:Class or path/file.py:Class."
     )
 
 
