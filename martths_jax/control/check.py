@@ -304,7 +304,8 @@ class _Look:
         if line is None and record is not None:
             self.refuse(
                 "have a delay line if `step` returns a record", "a record and no line",
-                " Let delay_line(trials) return DelayLine(samples, zeros of the record's shape).",
+                " Let delay_line(trials) return DelayLine(samples, zeros of the record's shape); "
+                "`window`, `blank_record` and `turn` of earlier versions became this method.",
             )  # fmt: skip
         if line is not None:
             self.same(line.blank, record, "record", "its delay line", "step")

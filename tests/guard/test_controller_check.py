@@ -20,6 +20,7 @@ from martths_jax import (
     simulate,
     simulation,
 )
+from martths_jax.control.base import DelayLine, Signal
 from martths_jax.control.check import PROBE, RESERVED, check_controller
 from martths_jax.control.estimators import DirectMeasurement
 from tests.engine.motions import burst
@@ -43,8 +44,9 @@ def deciding(make):
     return own(step=lambda self, state, seen: (state, make(seen.target_mm)))
 
 
-def blank(self, trials):
-    return jnp.zeros((2, trials))
+def line(samples=8, renew=None):
+    """A delay line of strokes."""
+    return lambda self, trials: DelayLine(samples, jnp.zeros((2, trials)), renew)
 
 
 #: name -> controller, what the sentence says.
@@ -74,21 +76,17 @@ WRONG = {
         lambda: own(step=lambda self, state, seen: Decision(seen.target_mm)),
         "return a tuple of state and Decision from step",
     ),
-    "record without a blank one": (
-        lambda: deciding(lambda x: Decision(x, record=x)), "have `blank_record` if `step` returns",
-    ),
-    "record without a window": (
-        lambda: own(blank_record=blank, step=lambda self, state, seen: (
-            state, Decision(seen.target_mm, record=seen.target_mm))),
-        "say by `window` after how many samples",
+    "record without a line": (
+        lambda: deciding(lambda x: Decision(x, record=x)), "have a delay line if `step` returns",
     ),
     "record of another shape": (
-        lambda: own(window=8, blank_record=blank, step=lambda self, state, seen: (
+        lambda: own(delay_line=line(), step=lambda self, state, seen: (
             state, Decision(seen.target_mm, record=seen.target_mm[0]))),
-        r"shape of its record, but got \(2, trials\) from blank_record and \(trials,\) from step",
+        r"shape of its record, but got \(2, trials\) from its delay line and \(trials,\) from step",
     ),
-    "blank record and no record": (
-        lambda: own(window=8, blank_record=blank), "keep the structure of its record",
+    "line and no record": (lambda: own(delay_line=line()), "keep the structure of its record"),
+    "line that is none": (
+        lambda: own(delay_line=lambda self, trials: 8), "a DelayLine or None .* but got int",
     ),
     "state in single precision": (
         lambda: own(init=lambda self, trials: jnp.zeros((2, trials), jnp.float32)),
@@ -106,8 +104,16 @@ WRONG = {
         lambda: own(step=lambda self, state, seen: ((state, state), Decision(seen.target_mm))),
         "keep the structure of its state",
     ),
-    "turn that changes the state": (
-        lambda: own(turn=lambda self, state: state[0]), "shape of its state, .* from turn",
+    "renewal that changes the state": (
+        lambda: own(delay_line=line(renew=lambda state: state[0]),
+                    step=lambda self, state, seen: (
+                        state, Decision(seen.target_mm, record=seen.target_mm))),
+        "shape of its state, .* from renew of its delay line",
+    ),
+    "signal with other axes than declared": (
+        lambda: own(signals=(Signal("a", ("actuator", "tap")),), step=lambda self, state, seen: (
+            state, Decision(seen.target_mm, signals={"a": seen.target_mm}))),
+        r"signal `a` the axes that it declares, \(actuator, tap, trials\), but got \(2, trials\)",
     ),
     "signal under a name of the loop": (
         lambda: deciding(lambda x: Decision(x, signals={"x_m": x})), "names other than x_a, x_m",
@@ -124,7 +130,7 @@ WRONG = {
             state, Decision(seen.target_mm if seen.k > 3 else state))),
         "step ends in TracerBoolConversionError",
     ),
-    "window that is no number": (lambda: own(window=1.5), "`window` .* whole number of samples"),
+    "line of half a sample": (lambda: own(delay_line=line(1.5)), "line of a whole number of sam"),
 }  # fmt: skip
 
 
@@ -144,7 +150,7 @@ def test_it_is_said_before_anything_is_compiled(benchmark, monkeypatch):
 
 
 def test_good_controllers_pass_once_for_all(benchmark, monkeypatch):
-    from martths_jax.control.controllers import check
+    from martths_jax.control import check
 
     monkeypatch.setattr(check, "_GOOD", {})
     ready = ADFC(nb=64, no=63).prepare(benchmark)

@@ -26,7 +26,7 @@ from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES, TAPS
 from martths_jax.control.adaptive.inverse import nominal_inverse
 from martths_jax.control.controllers.adfc import GUARD_PULL
 from martths_jax.control.estimators import DirectMeasurement
-from martths_jax.stability import frozen_adfc, spectral_radius
+from martths_jax.stability import spectral_radius
 from martths_jax.watch import Status
 from tests.engine.motions import burst
 
@@ -80,7 +80,7 @@ def test_the_others_need_what_the_plant_needs():
     benchmark = build_benchmark(fs=161)
     start = ADFC().prepare(benchmark).start
     inverse = nominal_inverse(benchmark.plant_model, benchmark.fs, BACKWARD_DIFFERENCES)
-    frozen = frozen_adfc(benchmark, ADFC(), np.stack([start, inverse] * 4, axis=-1))
+    frozen = ADFC().frozen(benchmark, np.stack([start, inverse] * 4, axis=-1))
     for controller in (Passthrough().prepare(benchmark), frozen):
         assert spectral_radius(benchmark, controller, draw_plants(8, seed=1)).max() < 1
     with pytest.raises(InputError, match="at least 161 Hz"):

@@ -30,7 +30,7 @@ from martths_jax.control.design.lqg import WEIGHTS, kalman_gain
 from martths_jax.control.estimators import design_kalman
 from martths_jax.plant import NOMINAL_HZ
 from martths_jax.sensitivity import run_sensitivity
-from martths_jax.stability import delay_margin, frozen_adfc, linear_loop, spectral_radius
+from martths_jax.stability import delay_margin, linear_loop, spectral_radius
 from martths_jax.study import run_study
 from martths_jax.sweep import run_sweep
 from martths_jax.tune.gradient import Gradient
@@ -74,7 +74,7 @@ BEGINNINGS = {
     "linear_loop": lambda m: linear_loop(m["benchmark"], m["lqg"], m["plants"]),
     "spectral_radius": lambda m: spectral_radius(m["benchmark"], m["lqg"], m["plants"]),
     "delay_margin": lambda m: delay_margin(m["benchmark"], m["lqg"], m["plants"]),
-    "frozen_adfc": lambda m: frozen_adfc(m["benchmark"], ADFC(), np.zeros((8, 2))),
+    "frozen": lambda m: ADFC().frozen(m["benchmark"], np.zeros((8, 2))),
     "run_study": lambda m: run_study(trials=1, out=m["folder"]),
     "run_sweep": lambda m: run_sweep({"nb": [64]}, trials=1, out=m["folder"]),
     "run_sensitivity": lambda m: run_sensitivity(trials=2, out=m["folder"]),

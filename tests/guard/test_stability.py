@@ -22,7 +22,6 @@ from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES
 from martths_jax.control.adaptive.inverse import nominal_inverse
 from martths_jax.stability import (
     delay_margin,
-    frozen_adfc,
     linear_loop,
     radius_along,
     spectral_radius,
@@ -42,7 +41,7 @@ def test_radius_is_the_growth_or_decay_of_a_simulation(benchmark):
     parts = np.array([0.0, 0.35, 0.45, 0.5])
     C = np.stack([(1 - p) * stable + p * unstable for p in parts], axis=-1)
     plants = plant_from_draws(np.zeros((parts.size, 9)))
-    frozen = frozen_adfc(benchmark, ADFC(), C)
+    frozen = ADFC().frozen(benchmark, C)
     radius = spectral_radius(benchmark, frozen, plants)
     assert np.all(radius[:2] < 1) and np.all(radius[2:] > 1.01)
 
@@ -72,7 +71,7 @@ def test_radius_along_a_run(benchmark):
     radius = radius_along(benchmark, ADFC(), plants, history, [0, 29, 30, 49])
     assert radius.shape == (2, 4)
     assert np.all(radius[0] < 1) and np.all(radius[1, :2] < 1) and np.all(radius[1, 2:] > 1.1)
-    alone = spectral_radius(benchmark, frozen_adfc(benchmark, ADFC(), anchor), plants)
+    alone = spectral_radius(benchmark, ADFC().frozen(benchmark, anchor), plants)
     np.testing.assert_allclose(radius[:, 0], alone, rtol=1e-9)
 
 
@@ -80,7 +79,7 @@ def test_radius_along_a_run(benchmark):
 def test_what_the_fit_is_pulled_to_is_a_stable_loop_by_itself(fs):
     benchmark = build_benchmark(fs)
     plants = draw_plants(40, seed=5, spread=2.0)
-    frozen = frozen_adfc(benchmark, ADFC(), inverse(benchmark))
+    frozen = ADFC().frozen(benchmark, inverse(benchmark))
     assert np.all(spectral_radius(benchmark, frozen, plants) < 1)
 
 
@@ -104,7 +103,7 @@ def test_without_feedback_of_the_error_no_delay_is_too_long(benchmark):
     """The frame carries a small share of the storey's stiffness: the force alone cannot tip it."""
     for controller in (
         Passthrough(q=3e-5).prepare(benchmark),
-        frozen_adfc(benchmark, ADFC(), inverse(benchmark)),
+        ADFC().frozen(benchmark, inverse(benchmark)),
     ):
         assert delay_margin(benchmark, controller, nominal_plant()) == [np.inf]
         A, B, C = (m[0] for m in linear_loop(benchmark, controller, nominal_plant(), opened=True))
@@ -124,5 +123,5 @@ def delayed_radius(A, B, C, samples: int) -> float:
 
 
 def test_an_adaptive_controller_has_to_be_frozen_first(benchmark):
-    with pytest.raises(InputError, match=r"linear and time-invariant.*frozen_adfc"):
+    with pytest.raises(InputError, match=r"linear and time-invariant.*frozen"):
         spectral_radius(benchmark, ADFC(), nominal_plant())
