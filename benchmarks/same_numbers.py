@@ -26,7 +26,7 @@ TRIALS = 40
 FAR, PAIR, DEVIATIONS = 17, 4, 30.0
 #: Attributes of study.nc that say where the numbers come from.
 ORIGIN = ("version_", "git_commit", "identity", "configuration", "provenance", "martths_content",
-          "platform", "machines", "content")  # fmt: skip
+          "platform", "machines", "content", "controllers")  # fmt: skip
 
 
 def write_plants(path: Path) -> None:

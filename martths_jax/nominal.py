@@ -11,14 +11,13 @@ import numpy as np
 
 from martths_jax import published
 from martths_jax.benchmark import Benchmark
-from martths_jax.control.controllers import ADFC, LQG, Controller
+from martths_jax.control.base import Controller
+from martths_jax.control.registry import find
 from martths_jax.indices import NAMES, indices
 from martths_jax.motions import Motion
 from martths_jax.plant import nominal_plant
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import simulate
-
-COLUMNS = {"lqg": published.LQG, "adfc": published.ADFC}
 
 
 @dataclass(frozen=True)
@@ -36,21 +35,17 @@ class Comparison:
     each: dict[str, dict[str, dict[str, float]]]
 
     def rows(self) -> list[dict[str, object]]:
-        """One row an index and controller: ours, published, deviation [%]."""
+        """One row an index and controller: ours, published, deviation [%]; blank where not in print."""
         found = []
         for controller, values in self.ours.items():
             for name in NAMES:
-                target = published.TABLE4[name][COLUMNS[controller]]
+                target = published.printed(name, controller)
                 value = values[name]
-                found.append(
-                    {
-                        "controller": controller,
-                        "index": name,
-                        "martths_jax": value,
-                        "published": target,
-                        "deviation_percent": 100 * (value / target - 1),
-                    }
-                )
+                row = {"controller": controller, "index": name, "martths_jax": value,
+                       "published": "", "deviation_percent": ""}  # fmt: skip
+                if target is not None:
+                    row |= {"published": target, "deviation_percent": 100 * (value / target - 1)}
+                found.append(row)
         return found
 
     def to_csv(self) -> str:
@@ -69,10 +64,11 @@ class Comparison:
         for index, cells in found.items():
             for name in self.ours:
                 r = rows[name, index]
+                printed = r["published"] != ""
                 cells += [
                     f"{r['martths_jax']:.2f}",
-                    f"{r['published']:g}",
-                    f"{r['deviation_percent']:+.1f} %",
+                    f"{r['published']:g}" if printed else "–",
+                    f"{r['deviation_percent']:+.1f} %" if printed else "–",
                 ]
         return found
 
@@ -96,11 +92,11 @@ def compare_with_table4(
     Args:
         benchmark: from ``build_benchmark``.
         motions: the paper averages El Centro, Kobe and Morgan Hill scaled by 0.40.
-        controllers: LQG and ADFC with their defaults if None.
+        controllers: those of the table with their defaults if None.
         noise: sensor noise; the benchmark's if None.
         progress: told how many runs are done.
     """
-    controllers = controllers or [LQG.design(benchmark), ADFC()]
+    controllers = controllers or [find(n).entry.build(benchmark) for n in published.COMPARED]
     each: dict[str, dict[str, dict[str, float]]] = {}
     done = 0
     for controller in controllers:

@@ -43,3 +43,25 @@ TABLE4 = {
     "J10_27": (13.2, 2.4, 4.61),
 }
 EXPERIMENT, LQG, ADFC = range(3)
+#: Controllers by name -> their column of Table 4, and the one that the paper proposes.
+COLUMNS = {"lqg": LQG, "adfc": ADFC}
+COMPARED = tuple(COLUMNS)
+PROPOSED = ("adfc",)
+#: Who is compared with whom, trial by trial.
+PAIR = ("adfc", "lqg")
+
+
+#: What the column of ``experiment`` is called.
+EXPERIMENT_TITLE = "experiment (LQG)"
+
+
+def experiment(index: str) -> float | None:
+    """What Table 4 prints of an index in the experiment; None where it prints nothing."""
+    return TABLE4[index][EXPERIMENT] if index in TABLE4 else None
+
+
+def printed(index: str, controller: str) -> float | None:
+    """What Table 4 prints of an index under a controller; None where it prints nothing."""
+    if controller not in COLUMNS or index not in TABLE4:
+        return None
+    return TABLE4[index][COLUMNS[controller]]

@@ -15,9 +15,10 @@ import numpy as np
 
 from martths_jax.campaign.fields import BY_NAME, FIELDS, SECTIONS
 from martths_jax.campaign.given import EXAMPLE, expand
-from martths_jax.control.controllers import Controller
+from martths_jax.control.base import Controller
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import DEFAULT_SCALE, Motion
+from martths_jax.published import COMPARED
 from martths_jax.sensors import SensorNoise
 from martths_jax.text import shortened
 
@@ -38,7 +39,7 @@ class StudyConfig:
 
     trials: int = 1000
     seed: int = 1
-    controllers: tuple = ("lqg", "adfc")
+    controllers: tuple = COMPARED
     draws: str = "independent"
     spread: float = 1.0
     plants: str | None = None
@@ -55,6 +56,7 @@ class StudyConfig:
     fs: float = 1024.0
     integrator: str = "newmark"
     partition: str = "benchmark"
+    force_from: str = "estimate"
     noise_power: float = SensorNoise.power
     noise_shared: bool = SensorNoise.shared
     out: str = "study"

@@ -122,6 +122,7 @@ def attributes(run: RunFolder) -> dict:
         **{f"version_{name}": text for name, text in versions.items()},
         "git_commit": ", ".join(c for c in run.header["commits"] if c) or "not a checkout",
         "platform": run.header["platform"],
+        "controllers": json.dumps(run.header.get("controllers", {})),
         "machines": json.dumps(list(run.header["machines"].values())),
         "command_line": run.header["command_line"],
         "seed": int(identity["seed"]),
@@ -133,6 +134,16 @@ def attributes(run: RunFolder) -> dict:
         "provenance": "provenance.json beside this file: times, sessions, hosts, devices",
     }
     return {k: _shortened(v) if isinstance(v, str) else v for k, v in found.items()}
+
+
+def controllers_of(dataset: xr.Dataset) -> dict[str, dict]:
+    """Of each controller in a result file: ``kind``, ``label``, ``look`` and ``paper``."""
+    try:
+        told = json.loads(dataset.attrs["controllers"])
+    except (KeyError, ValueError):  # a very long list is stored shortened
+        told = {}
+    blank = lambda name: {"kind": name, "label": name, "look": None, "paper": ""}  # noqa: E731
+    return {name: blank(name) | told.get(name, {}) for name in map(str, dataset.controller.values)}
 
 
 def _shortened(text: str) -> str:

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from martths_jax.benchmark import PARTITIONS
+from martths_jax.benchmark import FORCE_FROM, PARTITIONS
+from martths_jax.control.registry import names as known
 from martths_jax.structure.integrators import INTEGRATORS
 
 DRAWS = ("independent", "lhs", "sobol")
@@ -85,8 +86,8 @@ FIELDS = (
           "be a whole number from 0 to 2^63 - 1",
           "Plant and sensor noise of trial i depend on (seed, i) alone."),
     Field("controllers", "study", _is_list, "be a list of at least one controller",
-          "Controllers to compare: lqg, adfc, passthrough, NAME=KIND{KEY=VALUE,...}, or names of "
-          "[controller.NAME] tables."),
+          f"Controllers to compare: {', '.join(known())}, package.module:Class, file.py:Class, "
+          "NAME=KIND{KEY=VALUE,...}, or names of [controller.NAME] tables."),
     Field("draws", "study", one_of(DRAWS), _choice(DRAWS),
           "independent (extendable), lhs or sobol (spread evenly; they depend on `trials`)."),
     Field("spread", "study", lambda v: is_number(v) and v >= 0, "be zero or positive",
@@ -118,6 +119,8 @@ FIELDS = (
           "Integrator of the structures."),
     Field("partition", "model", one_of(PARTITIONS), _choice(PARTITIONS),
           "How the experimental frame is taken out of the reference."),
+    Field("force_from", "model", one_of(FORCE_FROM), _choice(FORCE_FROM),
+          "Strokes that the restoring force is made from: the controller's, or those measured."),
     Field("noise_power", "model", lambda v: is_number(v) and v >= 0, "be zero or positive [mm^2 s]",
           "Power of the sensor noise [mm^2 s]."),
     Field("noise_shared", "model", _bool, "be true or false",

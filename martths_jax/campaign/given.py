@@ -1,6 +1,7 @@
 """How a controller is named where a study is set up: ``lqg``, ``slow=adfc{nb=2048, no=2047}``, ...
 
-    KIND                    a kind with its defaults, or a name with a table of its own
+    KIND                    a kind with its defaults, or a name with a table of its own; a name of
+                            ours, package.module:Class or path/file.py:Class (``registry``)
     KIND{KEY=VALUE, ...}    with settings
     NAME=KIND{...}          under a name of its own, so that one kind can stand there twice
 
@@ -14,7 +15,8 @@ import re
 import tomllib
 from collections.abc import Mapping
 
-from martths_jax.control.controllers import Controller
+from martths_jax.control.base import Controller
+from martths_jax.control.registry import find
 from martths_jax.errors import InputError
 from martths_jax.text import shortened
 
@@ -72,14 +74,17 @@ def expand(controllers, tables: Mapping) -> tuple[tuple, dict]:
     ), tables
 
 
+def _is_place(kind: str) -> bool:
+    """Whether a kind says where a class is; its entry then says what it is called."""
+    return ":" in kind or kind.endswith(".py")
+
+
 def _from_mapping(controllers: Mapping, tables: dict) -> tuple:
     found = []
     for name, given in controllers.items():
         if isinstance(given, Controller):
             # A copy: the same object may stand elsewhere under its own name.
-            given = copy.copy(given)
-            object.__setattr__(given, "name", name)
-            found.append(given)
+            found.append(named(copy.copy(given), name))
             continue
         table = {"kind": given} if isinstance(given, str) else given
         if not isinstance(table, Mapping):
@@ -92,8 +97,15 @@ def _from_mapping(controllers: Mapping, tables: dict) -> tuple:
     return tuple(found)
 
 
+def named(controller: Controller, name: str) -> Controller:
+    """A controller under another name, which is no field, so that it shares a compiled program."""
+    object.__setattr__(controller, "name", name)
+    return controller
+
+
 def _from_text(text: str, tables: dict) -> str:
-    if text in tables or not set("={") & set(text):
+    plain = not set("={") & set(text)
+    if text in tables or (plain and not _is_place(text)):
         return text
     match = _TEXT.fullmatch(text.strip())
     if not match:
@@ -103,7 +115,7 @@ def _from_text(text: str, tables: dict) -> str:
             "themselves."
         )
     kind = match["kind"].strip()
-    name = (match["name"] or kind).strip()
+    name = (match["name"] or (find(kind).entry.name if _is_place(kind) else kind)).strip()
     _add(tables, name, kind, _settings(match["inside"] or "", text))
     return name
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
-import inspect
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from martths_jax.benchmark import Benchmark, build_benchmark
 from martths_jax.campaign.config import StudyConfig, unknown_names
 from martths_jax.campaign.draws import Draws, make_draws
+from martths_jax.campaign.given import named
 from martths_jax.campaign.sources import code_of, without_source
-from martths_jax.control.controllers import ADFC, LQG, Controller, Passthrough
+from martths_jax.control.base import Controller
+from martths_jax.control.controllers import ENTRIES
+from martths_jax.control.entry import Entry
+from martths_jax.control.registry import find, find_class, names
 from martths_jax.errors import InputError, raise_all
 from martths_jax.files import name_problems
 from martths_jax.motions import BUILTIN_NAMES, Motion, load_motion
@@ -21,10 +24,8 @@ from martths_jax.motions.catalogue import BENCHMARK_NAMES, record_files
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import prepare
 
-#: Kinds of controllers a configuration can name, and what makes them from their settings.
-KINDS = {"lqg": LQG.design, "adfc": ADFC, "passthrough": Passthrough}
-#: Arguments of these that are no settings.
-_NOT_SETTINGS = {"benchmark", "estimator", "start"}
+#: Folder in a run's that keeps the files that controllers were loaded from.
+FILES = "controllers"
 
 
 @dataclass(frozen=True)
@@ -34,20 +35,41 @@ class Plan:
     Attributes:
         config: the configuration it was built from.
         benchmark: the benchmark.
-        controllers: by name, in the order of the results.
+        chosen: controllers by name, in the order of the results.
         motions: in the order of the results.
         noise: sensor noise.
         draws: plants by trial number.
-        controller_settings: what identifies each controller, as JSON can hold it.
     """
 
     config: StudyConfig
     benchmark: Benchmark
-    controllers: dict[str, Controller]
+    chosen: dict[str, Chosen]
     motions: tuple[Motion, ...]
     noise: SensorNoise
     draws: Draws
-    controller_settings: dict[str, dict]
+
+    @property
+    def controllers(self) -> dict[str, Controller]:
+        """What runs, by name."""
+        return {name: one.controller for name, one in self.chosen.items()}
+
+    @property
+    def controller_settings(self) -> dict[str, dict]:
+        """What identifies each controller, as JSON can hold it."""
+        return {name: one.identity for name, one in self.chosen.items()}
+
+    @property
+    def tables(self) -> dict[str, dict]:
+        """Settings from which controllers can be made again; those of files name their copies."""
+        found = {}
+        for name, one in self.chosen.items():
+            if one.table is not None:
+                found[name] = dict(one.table)
+                if one.file is not None:
+                    _, sign, inside = one.table["kind"].rpartition(":")
+                    inside = sign + inside if sign and not inside.endswith(".py") else ""
+                    found[name]["kind"] = f"{copy_name(one)}{inside}"
+        return found
 
     @property
     def trials(self) -> int:
@@ -85,14 +107,14 @@ def build_plan(config: StudyConfig) -> Plan:
 
     benchmark = attempt(_benchmark, config)
     motions = [attempt(study_motion, name, config) for name in motion_names(config, attempt)]
-    controllers, settings = {}, {}
+    chosen = {}
     problems += _unknown_tables(config)
     if benchmark is not None:
         for given in config.controllers:
             made = attempt(build_controller, given, config, benchmark)
             if made is not None:
-                name, controllers[name], settings[name] = given_name(given), *made
-                attempt(prepare, made[0], benchmark, 1)
+                chosen[given_name(given)] = made
+                attempt(prepare, made.controller, benchmark, 1)
     draws = attempt(make_draws, config)
     if draws is not None and any(trial > draws.trials for trial in config.keep):
         problems.append(
@@ -101,10 +123,15 @@ def build_plan(config: StudyConfig) -> Plan:
     names = [m.name for m in motions if m is not None]
     for name in sorted({n for n in names if names.count(n) > 1}):
         problems.append(f"Two motions are called {name!r}; rename one of the files.")
-    problems += name_problems("motion", names) + name_problems("controller", list(controllers))
+    problems += name_problems("motion", names) + name_problems("controller", list(chosen))
     raise_all(problems, "The study cannot be run")
     noise = SensorNoise(config.noise_power, config.noise_shared, config.seed)
-    return Plan(config, benchmark, controllers, tuple(motions), noise, draws, settings)
+    return Plan(config, benchmark, chosen, tuple(motions), noise, draws)
+
+
+def copy_name(one: Chosen) -> str:
+    """Where a run's folder keeps the file of a controller, relative to the folder."""
+    return f"{FILES}/{one.file.stem}-{one.identity['sha256'][:12]}.py"
 
 
 def given_name(given) -> str:
@@ -113,7 +140,9 @@ def given_name(given) -> str:
 
 
 def _benchmark(config: StudyConfig) -> Benchmark:
-    return build_benchmark(config.fs, config.integrator, partition=config.partition)
+    return build_benchmark(
+        config.fs, config.integrator, partition=config.partition, force_from=config.force_from
+    )
 
 
 def motion_names(config: StudyConfig, attempt) -> tuple:
@@ -150,58 +179,87 @@ def study_motion(given, config: StudyConfig) -> Motion:
     )
 
 
-def defaults(kind: str) -> dict:
-    """Settings of a kind of controller and their defaults."""
-    parameters = inspect.signature(KINDS[kind]).parameters.values()
-    return {p.name: p.default for p in parameters if p.name not in _NOT_SETTINGS}
-
-
 def _unknown_tables(config: StudyConfig) -> list[str]:
     used = {given_name(c) for c in config.controllers}
     return [
         f"Table [controller.{name}] configures a controller that does not run; name it in "
         "`controllers`."
-        for name in sorted(set(config.controller) - used - set(KINDS))
+        for name in sorted(set(config.controller) - used - set(names()))
     ]
 
 
-def build_controller(given, config: StudyConfig, benchmark: Benchmark) -> tuple[Controller, dict]:
-    """A controller and what identifies it.
+@dataclass(frozen=True)
+class Chosen:
+    """A controller of a configuration.
+
+    Attributes:
+        controller: the object that runs.
+        entry: what speaks for it.
+        identity: what decides what it computes, as JSON can hold it.
+        table: its settings with their ``kind``, from which it can be made again; None for an
+            object, which cannot.
+        file: that its class was loaded from, if from one.
+    """
+
+    controller: Controller
+    entry: Entry
+    identity: dict
+    table: dict | None = None
+    file: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """Its name in the results."""
+        return self.controller.name
+
+    @property
+    def about(self) -> dict:
+        """What tables and figures say of it, as JSON can hold it."""
+        own = self.name == self.entry.name
+        return {
+            "kind": self.entry.name,
+            "label": self.entry.title if own else self.name,
+            "look": self.entry.look if own else None,
+            "paper": self.entry.paper,
+        }
+
+
+def build_controller(given, config: StudyConfig, benchmark: Benchmark) -> Chosen:
+    """A controller, and what identifies it.
 
     Raises:
-        InputError: an unknown kind or setting, or a value the controller refuses.
+        InputError: an unknown kind or setting, a value the controller refuses, or a file or package
+            that cannot be loaded.
     """
     if isinstance(given, Controller):
-        return given, {"kind": type(given).__name__, "code": code_of(given)}
+        kind = type(given)
+        identity = {"kind": kind.__name__, "code": code_of(given)}
+        return Chosen(given, find_class(kind), identity)
     table = dict(config.controller.get(given, {}))
     kind = table.pop("kind", given)
-    if kind not in KINDS:
-        raise InputError(
-            f"Controller {given!r} is unknown; known are {', '.join(KINDS)}, and names with a "
-            f"table [controller.{given}] that says their kind."
-        )
-    known = defaults(kind)
+    guest = find(kind)
+    entry = guest.entry
+    known = entry.defaults
     raise_all(unknown_names(sorted(set(table) - set(known)), set(known), f"Setting of {given}"))
     table = {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
     values = known | table
     try:
-        made = KINDS[kind](benchmark, **table) if kind == "lqg" else KINDS[kind](**table)
+        made = entry.build(benchmark, **table)
         raise_all(made.problems(benchmark))
     except InputError as error:
         raise InputError(f"Controller {given!r}: {error}") from None
     except (TypeError, ValueError) as error:
         raise InputError(f"Controller {given!r} has a setting of the wrong type: {error}") from None
-    values |= dict(getattr(made, "weights", ()))  # those left out are LQG's to choose
+    values |= dict(getattr(made, "weights", ()))  # those left out were the design's to choose
     plain = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
-    if dataclasses.is_dataclass(made) and made.name != given:
-        made = _named(made, given)
-    return made, {"kind": kind} | plain
-
-
-def _named(controller: Controller, name: str) -> Controller:
-    # The name is a class attribute, not a field, so that it stays out of the compiled program.
-    object.__setattr__(controller, "name", name)
-    return controller
+    if made.name != given:
+        made = named(made, given)
+    identity = {"kind": kind} | plain
+    if kind != entry.name or entry not in ENTRIES:
+        identity |= {"kind": entry.name, "code": code_of(made)}
+    if guest.sha256:
+        identity |= {"sha256": guest.sha256}
+    return Chosen(made, entry, identity, {"kind": kind} | plain, guest.file)
 
 
 def motion_identity(motion: Motion) -> dict:

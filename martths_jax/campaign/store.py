@@ -2,6 +2,7 @@
 
     run.json        what decides the numbers, the configuration, the number of trials
     plants.csv      the plants, where they are not independent draws
+    controllers/    copies of the files that controllers were loaded from
     parts/C/M/      one file a chunk, controller C and motion M: 000000-000255.npz
     provenance.json when, where and how each session ran
     .martths/       who runs there now, and what is being written (``owner``, ``files``)
@@ -13,9 +14,10 @@ whenever the run was killed, whatever happened to the disk, and whoever copied w
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,12 +29,14 @@ from martths_jax.campaign.files import (
     damaged_files,
     disk_errors,
     set_aside,
+    write_bytes,
     write_text,
 )
 from martths_jax.campaign.header import FOLDER_FORMAT, read_header, sealed
 from martths_jax.campaign.machine import MIXED_NOTE
 from martths_jax.campaign.owner import Owner, door
 from martths_jax.campaign.parts import Damaged, read_part
+from martths_jax.campaign.plan import FILES, Chosen, copy_name
 from martths_jax.campaign.stored import Stored
 from martths_jax.errors import InputError
 from martths_jax.text import counted
@@ -41,7 +45,7 @@ from martths_jax.text import counted
 FORMAT = 1
 #: What a run leaves in its folder; nothing else is ever deleted.
 OWN = ("run.json", "parts", "provenance.json", "study.nc", "study.csv", "summary.md",
-       "signals.nc", "config.toml", "plants.csv")  # fmt: skip
+       "signals.nc", "config.toml", "plants.csv", FILES)  # fmt: skip
 #: Plants that were given or spread evenly, so that the run stands on its own.
 PLANTS = "plants.csv"
 _AGAIN = (
@@ -228,6 +232,20 @@ class RunFolder(Stored):
         if file.exists():
             set_aside(file)
         write_plants(draws.plants(np.arange(1, draws.trials + 1)), file)
+
+    def keep_controllers(self, chosen: Iterable[Chosen]) -> None:
+        """Store the files that controllers were loaded from, so that they can be made again."""
+        for one in chosen:
+            if one.file is None:
+                continue
+            content = one.file.read_bytes()
+            if hashlib.sha256(content).hexdigest() != one.identity["sha256"]:
+                raise InputError(f"{one.file} was changed while it ran; repeat the command.")
+            path = self.path / copy_name(one)
+            if not (path.is_file() and path.read_bytes() == content):
+                with disk_errors(path):
+                    path.parent.mkdir(exist_ok=True)
+                write_bytes(path, content)
 
     def draws(self) -> Draws:
         """The plants by trial number.

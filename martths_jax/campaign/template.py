@@ -10,7 +10,8 @@ import numpy as np
 from martths_jax.campaign.config import StudyConfig, as_settings
 from martths_jax.campaign.fields import FIELDS, SECTIONS
 from martths_jax.campaign.files import write_text
-from martths_jax.campaign.plan import KINDS, defaults
+from martths_jax.control.controllers import ENTRIES
+from martths_jax.control.entry import Entry
 from martths_jax.errors import InputError
 
 _HEAD = """\
@@ -62,9 +63,23 @@ def template(name: str = "study.toml") -> str:
     """A commented configuration with all defaults."""
     settings = as_settings(StudyConfig())
     sections = [_section(s, settings, comments=True) for s in SECTIONS]
-    tables = _tables({kind: defaults(kind) for kind in KINDS if kind in settings["controllers"]})
-    note = '# Settings of the controllers; a new name says its kind too: kind = "adfc".\n'
-    return "\n".join([_HEAD.format(name=name), *sections, note + tables[0], *tables[1:]])
+    used = [entry for entry in ENTRIES if entry.name in settings["controllers"]]
+    note = (
+        "# Settings of the controllers; a new name says its kind too, one of ours or a class:\n"
+        f'# kind = "{used[-1].name}", "package.module:Class" or "path/file.py:Class" (whose code '
+        "is run).\n"
+    )
+    tables = "\n".join(map(_commented, used))
+    return "\n".join([_HEAD.format(name=name), *sections, note + tables])
+
+
+def _commented(entry: Entry) -> str:
+    """Table of an entry's defaults, each with what it means."""
+    lines = [f"[controller.{toml_key(entry.name)}]"]
+    for p in entry.parameters:
+        meaning = f"# {p.name}: {p.title}; must {p.wanted}"
+        lines += [meaning] + [f"{p.name} = {toml_value(p.default)}"] * (p.default is not None)
+    return "\n".join(lines) + "\n"
 
 
 def write_template(path: Path, overwrite: bool = False) -> None:

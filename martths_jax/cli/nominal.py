@@ -52,7 +52,8 @@ Seed = Annotated[int, typer.Option("--seed", help="Seed of the plant and noise d
 def build_controller(given: str, benchmark: Benchmark) -> tuple[Controller, dict]:
     """Controller of ``[NAME=]KIND[{KEY=VALUE,...}]`` and its settings."""
     config = make_config(controllers=[given])
-    return plan.build_controller(config.controllers[0], config, benchmark)
+    chosen = plan.build_controller(config.controllers[0], config, benchmark)
+    return chosen.controller, chosen.identity
 
 
 def default_motions(records: Path | None) -> list[str]:

@@ -113,6 +113,8 @@ class Derived:
         name: of the axis; of: of the parameter that it sets.
         value: from the axis' value, the other settings and the sampling rate [Hz] to the parameter.
         label, unit, low, high, above, whole: as of ``Parameter``, of the axis' values.
+        of_cell: the axis' value from all settings and the sampling rate, where results should hold
+            it for every cell.
     """
 
     name: str
@@ -124,6 +126,7 @@ class Derived:
     high: float = np.inf
     above: bool = False
     whole: bool = False
+    of_cell: Callable[[Mapping[str, Any], float], float] | None = None
 
     @property
     def as_parameter(self) -> Parameter:
@@ -150,6 +153,9 @@ class Entry:
             may be traced; by default it is made and prepared like any other.
         settings_from: ``settings_from(values)``: settings that mean the same as such values, where
             the values are none.
+        follow: ``follow(own, changed)``: settings that change with others where a sweep moves
+            these, given what the controller has and what moves.
+        clash: ``clash(settings)``: sentences about settings that exclude each other.
         look: position of its colour and dashes, where that shall be the same in all figures.
     """
 
@@ -163,6 +169,8 @@ class Entry:
     tuned: tuple[Parameter, ...] = ()
     traced: Callable[..., Controller] | None = None
     settings_from: Callable[[Mapping[str, float]], dict[str, Any]] | None = None
+    follow: Callable[[Mapping[str, Any], Mapping[str, Any]], dict[str, Any]] | None = None
+    clash: Callable[[Mapping[str, Any]], list[str]] | None = None
     look: int | None = None
 
     def __post_init__(self):
@@ -203,6 +211,15 @@ class Entry:
             for p in self.parameters
             if p.name in settings and not p.good(settings[p.name])
         ]
+
+    def followed(self, own: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
+        """Settings that change with others, see ``follow``."""
+        return {} if self.follow is None else self.follow(own, changed)
+
+    def clashes(self, settings: Mapping[str, Any]) -> list[str]:
+        """Sentences about settings out of range or that exclude each other."""
+        found = self.problems(settings)
+        return found or ([] if self.clash is None else self.clash(settings))
 
     def build(self, benchmark, **settings) -> Controller:
         """The controller with some settings, not prepared.

@@ -122,7 +122,8 @@ def _load_file(path: Path) -> tuple[ModuleType, str]:
             f"Controller file {path} cannot be read ({error.strerror or error})."
         ) from None
     digest = hashlib.sha256(content).hexdigest()
-    name = f"martths_guest_{path.stem}_{digest[:12]}"
+    # The same content has the same name wherever it lies, since code is identified by it.
+    name = f"martths_guest_{digest[:12]}"
     known = sys.modules.get(name)
     if known is not None and Path(known.__file__ or "") == path.resolve():
         return known, digest

@@ -17,7 +17,8 @@ from martths_jax.figures import histories, paired, plants, spread, structure, sy
 from martths_jax.figures.source import ZOOM, Source, open_source
 from martths_jax.figures.style import Drawing, house_style, save
 from martths_jax.files import safe_name
-from martths_jax.study.summary import PAIR, pairs
+from martths_jax.published import PAIR, PROPOSED
+from martths_jax.study.summary import pairs
 
 __all__ = ["Drawing", "Source", "draw_figures", "drawings", "figure_list", "open_source"]
 
@@ -30,7 +31,7 @@ def figure_list(source: Source) -> dict[str, Callable[[], Drawing]]:
     """
     found: dict[str, Callable[[], Drawing]] = {}
     numbers = {name: 8 + i for i, name in enumerate(ZOOM)}
-    tails = {c: "" if c == "adfc" else f"_{safe_name(c)}" for c in source.controllers}
+    tails = {c: "" if c in PROPOSED else f"_{safe_name(c)}" for c in source.controllers}
     signals = (source.study.folder / "signals.nc").is_file()
     if signals:
         for motion in source.motions:

@@ -9,7 +9,6 @@ from martths_jax.figures.style import (
     DOUBLE,
     TARGET,
     Drawing,
-    controller_label,
     line,
     motion_label,
     new_figure,
@@ -47,7 +46,7 @@ def strokes(source: Source, motion: str) -> Drawing:
     caption = (
         f"Target and measured strokes under {motion_label(motion)}, {source.who}; whole record and "
         "the three shaded windows. The target drawn is that of "
-        f"{controller_label(source.controllers[-1])}."
+        f"{source.label(source.controllers[-1])}."
     )
     return Drawing(figure, data, caption)
 
@@ -64,7 +63,7 @@ def _strokes(axis, source, time, runs, actuator, window, widths) -> None:
             run["x_m"][inside, actuator],
             **line(source.position(name)),
             lw=widths[1],
-            label=f"measured, {controller_label(name)}",
+            label=f"measured, {source.label(name)}",
         )
     axis.set_xlim(window)
     axis.margins(y=0.08)
@@ -100,7 +99,7 @@ def coefficients(source: Source, controller: str) -> Drawing:
     figure.legend(handles, labels, loc="outside upper center", ncols=2)
     figure.align_ylabels()
     caption = (
-        f"Identified coefficients of {controller_label(controller)} under {motion_label(motion)}, "
+        f"Identified coefficients of {source.label(controller)} under {motion_label(motion)}, "
         f"{source.who}: what multiplies the target strokes and their derivatives in each command."
     )
     return Drawing(figure, data, caption)

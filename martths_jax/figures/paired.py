@@ -9,7 +9,6 @@ from martths_jax.figures.source import Source
 from martths_jax.figures.style import (
     DOUBLE,
     Drawing,
-    controller_label,
     index_label,
     look,
     motion_label,
@@ -56,7 +55,7 @@ def paired(source: Source, pair: tuple[str, str]) -> Drawing:
             axis.plot(at, middle, ls="", marker=shape["marker"], color=shape["color"], ms=3.2,
                       mfc="white" if i % 2 == 0 else shape["color"], mew=0.8,
                       label=motion_label(motion))  # fmt: skip
-    first, second = map(controller_label, pair)
+    first, second = map(source.label, pair)
     top.axhline(0, color="black", lw=0.7)
     bottom.axhline(50, color="black", lw=0.7)
     top.set_ylabel(f"median |{first}| − |{second}|\n[% of {second}'s median]")

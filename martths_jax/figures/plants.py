@@ -10,7 +10,6 @@ from martths_jax.figures.source import Source
 from martths_jax.figures.style import (
     DOUBLE,
     Drawing,
-    controller_label,
     line,
     motion_label,
     new_figure,
@@ -147,7 +146,7 @@ def delay(source: Source) -> Drawing:
             run = source.history(name, source.motion)
             f, late = spectral_delay(run["x_a"][:, i], run["x_m"][:, i], source.fs)
             axis.plot(
-                f, late, **line(source.position(name)), label=f"with {controller_label(name)}"
+                f, late, **line(source.position(name)), label=f"with {source.label(name)}"
             )
             data[f"{name}_{i + 1}_ms"] = np.interp(FREQUENCY, f, late, np.nan, np.nan)
         axis.axhline(0, color="0.4", lw=0.6)

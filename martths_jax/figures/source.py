@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from martths_jax.errors import InputError
-from martths_jax.figures.style import controller_position
+from martths_jax.figures.style import Names
 from martths_jax.study import Study, open_study
 
 #: Zoom windows of the benchmark's plots [s], by the record's name (benchmark's plotting scripts).
@@ -39,6 +40,11 @@ class Source:
         """Names of the controllers, in the study's order."""
         return [str(c) for c in self.study.dataset.controller.values]
 
+    @cached_property
+    def names(self) -> Names:
+        """How the controllers are called and drawn."""
+        return Names(self.study.dataset)
+
     @property
     def motions(self) -> list[str]:
         """Names of the motions, in the study's order."""
@@ -56,7 +62,11 @@ class Source:
 
     def position(self, controller: str) -> int:
         """Which look a controller has (see ``style.look``)."""
-        return controller_position(controller, self.controllers)
+        return self.names.position(controller)
+
+    def label(self, controller: str) -> str:
+        """What a controller is called in legends."""
+        return self.names.label(controller)
 
     def values(self, controller: str, motion: str, index: str) -> np.ndarray:
         """(trials,) index of the uncertain trials, NaN where one diverged."""

@@ -10,7 +10,6 @@ from martths_jax.figures.source import Source
 from martths_jax.figures.style import (
     DOUBLE,
     Drawing,
-    controller_label,
     index_label,
     line,
     look,
@@ -35,7 +34,7 @@ def controllers(source: Source) -> Drawing:
         f"Median (marker), interquartile range (bar) and P5-P95 (line) of the indices over the "
         f"uncertain plants, {motion_label(source.motion)}."
     )
-    return _ranges(samples, places, controller_label, "controller", caption)
+    return _ranges(samples, places, source.label, "controller", caption)
 
 
 def motions(source: Source, controller: str) -> Drawing:
@@ -44,7 +43,7 @@ def motions(source: Source, controller: str) -> Drawing:
     places = {m: i for i, m in enumerate(samples)}
     caption = (
         f"Median (marker), interquartile range (bar) and P5-P95 (line) of the indices over the "
-        f"uncertain plants, {controller_label(controller)}, motion by motion."
+        f"uncertain plants, {source.label(controller)}, motion by motion."
     )
     return _ranges(samples, places, motion_label, "motion", caption)
 
@@ -107,7 +106,7 @@ def histograms(source: Source) -> Drawing:
             shape = look(source.position(c))
             filled = source.position(c) % 2 == 1
             counts, _ = np.histogram(sample[np.isfinite(sample)], edges)
-            axis.stairs(counts, edges, fill=filled, lw=0.9, label=controller_label(c),
+            axis.stairs(counts, edges, fill=filled, lw=0.9, label=source.label(c),
                         color=shape["fill"] if filled else shape["color"],
                         zorder=1 if filled else 3)  # fmt: skip
             columns[f"trials_{c}"] += counts.tolist()
@@ -116,7 +115,7 @@ def histograms(source: Source) -> Drawing:
         columns["to_percent"] += edges[1:].tolist()
 
     figure = _panels(ERRORS, panel, 178, "trials")
-    names = " and ".join(map(controller_label, source.controllers))
+    names = " and ".join(map(source.label, source.controllers))
     caption = (
         f"Histograms of the error indices over the uncertain plants, {names}, "
         f"{motion_label(source.motion)}; outside the drawn range lie 0.5 % of them a side."
@@ -150,7 +149,7 @@ def ecdf(source: Source) -> Drawing:
             drawn = _spaced(sample.size, STEPS)
             sample, share = sample[drawn], share[drawn]
             axis.step(sample, share, where="post", **line(source.position(c)),
-                      label=controller_label(c))  # fmt: skip
+                      label=source.label(c))  # fmt: skip
             for column, values in zip(
                 columns, ([name] * sample.size, [c] * sample.size, sample, share), strict=True
             ):

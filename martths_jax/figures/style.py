@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from martths_jax.campaign.dataset import controllers_of
+from martths_jax.control.controllers import ENTRIES
 from martths_jax.files import atomic
 from martths_jax.text import csv_cell
 
@@ -31,6 +33,8 @@ LOOKS = (
     {"color": PURPLE, "ls": (0, (5, 1, 1, 1)), "marker": "D", "fill": "#E8C4D8"},
     {"color": "black", "ls": (0, (3, 1, 1, 1, 1, 1)), "marker": "v", "fill": "0.5"},
 )
+#: How many looks are taken by controllers that look the same in every figure.
+FIXED = sum(entry.look is not None for entry in ENTRIES)
 _RC = {
     "font.family": "sans-serif",
     "font.size": 7.5,
@@ -101,22 +105,33 @@ def line(position: int) -> dict:
     return {k: look(position)[k] for k in ("color", "ls")}
 
 
-def controller_position(name: str, all_names) -> int:
-    """Position of a controller: LQG and ADFC look the same in every study."""
-    fixed = {"lqg": 0, "adfc": 1}
-    others = [n for n in all_names if n not in fixed]
-    return fixed[name] if name in fixed else 2 + others.index(name)
+class Names:
+    """How the controllers of a result file are called and drawn, as their entries say.
+
+    Args:
+        dataset: of a study, sweep or analysis.
+    """
+
+    def __init__(self, dataset):
+        self._about = controllers_of(dataset)
+
+    def label(self, controller: str) -> str:
+        """Name for a legend or the head of a table."""
+        return self._about[controller]["label"]
+
+    def position(self, controller: str) -> int:
+        """Position of its look (see ``look``): where its entry puts it, or after all of those."""
+        fixed = self._about[controller]["look"]
+        if fixed is not None:
+            return fixed
+        others = [name for name, about in self._about.items() if about["look"] is None]
+        return FIXED + others.index(controller)
 
 
 def index_label(name: str) -> str:
     """``J5_28`` as it is typeset."""
     number, _, where = name[1:].partition("_")
     return f"$J_{{{number},{where}}}$"
-
-
-def controller_label(name: str) -> str:
-    """Name of a controller for a legend: abbreviations in capitals."""
-    return name.upper() if name in ("lqg", "adfc") else name
 
 
 def motion_label(name: str) -> str:

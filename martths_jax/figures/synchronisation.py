@@ -8,7 +8,6 @@ from martths_jax.figures.source import Source
 from martths_jax.figures.style import (
     SINGLE,
     Drawing,
-    controller_label,
     look,
     motion_label,
     new_figure,
@@ -45,7 +44,7 @@ def _subspace(source, pick, names, units, wanted, reached, coordinates) -> Drawi
             axis.plot([-end, end], [-end, end], color="black", ls=(0, (2, 2)), lw=0.7)
             axis.set(xlim=(-end, end), ylim=(-end, end), aspect="equal")
             axis.locator_params(nbins=5)
-            axis.set_title(f"{controller_label(name)}, {names[i]}")
+            axis.set_title(f"{source.label(name)}, {names[i]}")
             axis.set_xlabel(f"{wanted} [{units[i]}]")
             axis.set_ylabel(f"{reached} [{units[i]}]")
             data[f"{wanted.split()[0]}_{i + 1}_{name}_{units[i]}"] = x

@@ -12,14 +12,12 @@ import xarray as xr
 from martths_jax import published
 from martths_jax.campaign.statistics import PERCENTS, percentile
 from martths_jax.errors import argument_error
-from martths_jax.figures.style import controller_label, index_label, motion_label
+from martths_jax.figures.style import index_label, motion_label
 from martths_jax.indices import DELAYS, NAMES
 from martths_jax.study.summary import Table, number
 from martths_jax.text import csv_cell
 
 FORMATS = ("md", "tex", "csv")
-#: Published columns of Table 4 by the controller they are to be compared with.
-PUBLISHED = {"lqg": published.LQG, "adfc": published.ADFC}
 
 
 def study_tables(dataset: xr.Dataset) -> list[Table]:
@@ -45,23 +43,25 @@ def nominal_means(dataset: xr.Dataset) -> dict[str, dict[str, float]]:
 def nominal_table(dataset: xr.Dataset) -> Table:
     """The paper's Table 4 and our numbers (nominal plant, mean over the motions)."""
     means = nominal_means(dataset)
-    heads = ["index", "experiment (LQG)"]
+    called = Names(dataset)
+    heads = ["index", published.EXPERIMENT_TITLE]
     for name in means:
-        label = controller_label(name)
-        known = name in PUBLISHED
+        label = called.label(name)
+        known = name in published.COLUMNS
         heads += [f"{label}, paper", f"{label}, here", "deviation"] if known else [f"{label}, here"]
     rows = []
     for index in NAMES:
-        printed = published.TABLE4[index]
-        cells = [f"{index} [{unit_of(index)}]", f"{printed[published.EXPERIMENT]:g}"]
+        cells = [f"{index} [{unit_of(index)}]", _printed(published.experiment(index))]
         for name, found in means.items():
             value = found[index]
-            if name not in PUBLISHED:
+            if name not in published.COLUMNS:
                 cells.append(number(value))
                 continue
-            paper = printed[PUBLISHED[name]]
-            off = "–" if np.isnan(value) else f"{round(100 * (value / paper - 1)):+d} %"
-            cells += [f"{paper:g}", number(value), off]
+            paper = published.printed(index, name)
+            off = "–"
+            if paper is not None and not np.isnan(value):
+                off = f"{round(100 * (value / paper - 1)):+d} %"
+            cells += [_printed(paper), number(value), off]
         rows.append(tuple(cells))
     motions = ", ".join(motion_label(str(m)) for m in dataset.motion.values)
     note = (
@@ -71,10 +71,15 @@ def nominal_table(dataset: xr.Dataset) -> Table:
     return Table("Table 4: nominal plant", tuple(heads), rows, (note,))
 
 
+def _printed(value: float | None) -> str:
+    """A published number as it is printed, or a dash."""
+    return "–" if value is None else f"{value:g}"
+
+
 def distribution_table(dataset: xr.Dataset, motion: str) -> Table:
     """P5, P50 and P95 of every index over the uncertain plants, controller beside controller."""
-    names = [str(c) for c in dataset.controller.values]
-    heads = ["index", *(f"{controller_label(c)} P{p}" for c in names for p in PERCENTS)]
+    names, called = [str(c) for c in dataset.controller.values], Names(dataset)
+    heads = ["index", *(f"{called.label(c)} P{p}" for c in names for p in PERCENTS)]
     value = {c: dataset.value.sel(controller=c, motion=motion).values[1:] for c in names}
     rows = [
         (
@@ -84,7 +89,7 @@ def distribution_table(dataset: xr.Dataset, motion: str) -> Table:
         for i, index in enumerate(NAMES)
     ]
     counts = ", ".join(
-        f"{controller_label(c)} {int(np.isfinite(v[:, 0]).sum())} of {len(v)}"
+        f"{called.label(c)} {int(np.isfinite(v[:, 0]).sum())} of {len(v)}"
         for c, v in value.items()
     )
     note = f"Over the uncertain plants that finished: {counts}."
@@ -98,8 +103,9 @@ def tidy_rows(dataset: xr.Dataset) -> list[tuple]:
         for index in NAMES:
             head = ("table4", "mean", name, index, unit_of(index))
             rows.append((*head, "here", found[index]))
-            if name in PUBLISHED:
-                rows.append((*head, "published", published.TABLE4[index][PUBLISHED[name]]))
+            paper = published.printed(index, name)
+            if paper is not None:
+                rows.append((*head, "published", paper))
     for motion in map(str, dataset.motion.values):
         for name in map(str, dataset.controller.values):
             cell = dataset.value.sel(controller=name, motion=motion).values[1:]

@@ -11,7 +11,6 @@ from martths_jax.figures.style import (
     BLUE,
     DOUBLE,
     Drawing,
-    controller_label,
     house_style,
     index_label,
     new_figure,
@@ -84,7 +83,7 @@ def tornado(found: Sensitivity, controller: str, shown: Sequence[str]) -> Drawin
     if drawn:
         figure.legend(*drawn[0], loc="outside upper center", ncols=2)
     caption = (
-        f"Sobol' indices of {controller_label(controller)}: share of an index's variance that a "
+        f"Sobol' indices of {Names(found.dataset).label(controller)}: share of an index's variance that a "
         f"factor moves alone (first order) and with all its interactions (total), with {LEVEL:.0%} "
         f"bootstrap confidence intervals, N = {one.used}."
     )

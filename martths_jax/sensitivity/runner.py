@@ -17,6 +17,7 @@ from martths_jax.campaign.progress import Reporter, Tally, compile_seconds
 from martths_jax.errors import argument_error, raise_all
 from martths_jax.indices import NAMES
 from martths_jax.plant import check_plants
+from martths_jax.published import PROPOSED
 from martths_jax.runtime import check_runtime
 from martths_jax.sensitivity.design import Design, is_power_of_two, make_design, most_samples
 from martths_jax.sensitivity.results import Sensitivity, write_results
@@ -28,7 +29,7 @@ from martths_jax.text import counted
 from martths_jax.watch import Status
 
 #: What an analysis has where a study has another default.
-DEFAULTS = {"trials": 256, "controllers": ("adfc",), "out": "sensitivity", "signals": False}
+DEFAULTS = {"trials": 256, "controllers": PROPOSED, "out": "sensitivity", "signals": False}
 #: Base samples that run together; each needs two noise realisations.
 CHUNK = 128
 

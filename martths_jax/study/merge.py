@@ -11,7 +11,7 @@ from martths_jax.campaign import provenance
 from martths_jax.campaign.config import make_config
 from martths_jax.campaign.files import write_text, writing
 from martths_jax.campaign.machine import MIXED_NOTE
-from martths_jax.campaign.plan import build_plan
+from martths_jax.campaign.plan import FILES, build_plan
 from martths_jax.campaign.progress import Reporter
 from martths_jax.campaign.store import PLANTS, RunFolder
 from martths_jax.errors import InputError, raise_all
@@ -70,6 +70,11 @@ def merge_runs(
         return finish(run, engine, reporter)
 
 
+def _placed(kind: str, folder: Path) -> str:
+    """The kind of a controller, which may name a copy in a run's folder."""
+    return f"{folder / kind}" if kind.startswith(f"{FILES}/") else kind
+
+
 def _mixed(machines: dict) -> str:
     one, other = list(machines.values())[:2]
     return (
@@ -98,6 +103,13 @@ def engine_again(run: RunFolder, records: str | None, keep, reporter: Reporter):
     settings = run.header["config"] | {"out": str(run.path), "keep": tuple(keep)}
     if records is not None:
         settings["records"] = records
+    settings["controller"] = {
+        name: table | {"kind": _placed(table.get("kind", name), run.path)}
+        for name, table in settings["controller"].items()
+    }
+    for table in settings["controller"].values():
+        if table["kind"].startswith(str(run.path)):
+            reporter.notice(f"Loading runs the code of {table['kind'].rpartition('.py')[0]}.py.")
     if (run.path / PLANTS).exists():
         settings |= {"plants": str(run.path / PLANTS), "plants_as": "auto", "draws": "independent"}
     try:

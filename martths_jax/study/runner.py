@@ -87,6 +87,7 @@ def run_study(
         allow_mixed=allow_mixed, notice=reporter.notice,
     ) as run:  # fmt: skip
         run.keep_draws(plan.draws)
+        run.keep_controllers(plan.chosen.values())
         engine = make_engine(plan, reporter)
         session = Session(run, engine, command_line)
         try:
@@ -109,7 +110,7 @@ def header(plan: Plan, command_line: str) -> dict:
         "controllers": list(plan.controllers),
         "motions": [m.name for m in plan.motions] if config.motions is None
         else [m.name if isinstance(m, Motion) else m for m in config.motions],
-        "controller": {k: v for k, v in plan.controller_settings.items() if "code" not in v},
+        "controller": plan.tables,
     }  # fmt: skip
     # Where and how it runs is in provenance.json: the results must not depend on it.
     for name in ("out", "devices", "memory_gb", "max_failed", "keep", "signals"):
@@ -117,6 +118,7 @@ def header(plan: Plan, command_line: str) -> dict:
     return {
         "trials": plan.trials,
         "identity": provenance.identity(plan),
+        "controllers": {name: one.about for name, one in plan.chosen.items()},
         "machines": {machine_digest(): machine_identity()},
         "config": settings,
         "command_line": command_line,

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from martths_jax import published
+from martths_jax.campaign.dataset import controllers_of
 from martths_jax.campaign.statistics import LEVEL, PERCENTS, Estimate, compare, percentile
 from martths_jax.indices import NAMES
 from martths_jax.screen import ScreenTable
 from martths_jax.text import counted, markdown_text
 from martths_jax.watch import Status
-
-#: The paper's comparison: this kind of controller against that one.
-PAIR = ("adfc", "lqg")
 
 
 @dataclass(frozen=True)
@@ -89,16 +86,14 @@ def pairs(dataset: xr.Dataset) -> list[tuple[str, str]]:
     against the first of that kind.
     """
     names = [str(name) for name in dataset.controller.values]
-    try:
-        tables = json.loads(dataset.attrs["identity"])["controller"]
-    except (KeyError, ValueError):  # a very long identity is stored shortened
-        tables = {}
-    kind = {name: str(tables.get(name, {}).get("kind", name)).lower() for name in names}
-    kind |= {name: name for name in PAIR if name in names}
+    about = controllers_of(dataset)
+    kind = {name: about[name]["kind"] for name in names}
+    kind |= {name: name for name in published.PAIR if name in names}
     of = {k: [name for name in names if kind[name] == k] for k in dict.fromkeys(kind.values())}
     for k, group in of.items():
         group.sort(key=lambda name: name != k)  # the one called like its kind comes first
-    found = [(of[PAIR[0]][0], of[PAIR[1]][0])] if set(PAIR) <= set(of) else []
+    one, other = published.PAIR
+    found = [(of[one][0], of[other][0])] if {one, other} <= set(of) else []
     return found + [(other, group[0]) for group in of.values() for other in group[1:]]
 
 
@@ -116,6 +111,10 @@ def number(value: float) -> str:
     """Four significant digits, three below one."""
     digits = 4 if abs(value) >= 1 else 3
     return "–" if np.isnan(value) else f"{value:#.{digits}g}".rstrip(".")
+
+
+def _or_dash(value: float | None) -> str:
+    return "–" if value is None else number(float(value))
 
 
 def with_interval(estimate: Estimate) -> str:
@@ -173,15 +172,14 @@ def _paired(dataset, motion: str, pair: tuple[str, str]) -> Table:
 
 def _nominal(dataset) -> Table:
     mean = dataset.value.sel(trial=0).mean("motion", skipna=False)
-    columns = {"lqg": published.LQG, "adfc": published.ADFC}
     heads, pick = ["index"], []
-    for controller in dataset.controller.values:
-        if controller in columns:
+    for controller in map(str, dataset.controller.values):
+        if controller in published.COLUMNS:
             heads.append(f"{controller}, Table 4")
-            pick.append(lambda name, c=columns[controller]: published.TABLE4[name][c])
+            pick.append(lambda name, c=controller: published.printed(name, c))
         heads.append(f"{controller}, here")
         pick.append(lambda name, c=controller: float(mean.sel(controller=c, index=name)))
-    rows = [(name, *(number(float(get(name))) for get in pick)) for name in NAMES]
+    rows = [(name, *(_or_dash(get(name)) for get in pick)) for name in NAMES]
     motions = ", ".join(dataset.motion.values)
     note = (
         f"Nominal plant (trial 0, one noise draw), mean over {motions}; Table 4 is over the "

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from martths_jax.campaign.fields import is_number, is_positive
+from martths_jax.control.controllers import ENTRIES
+from martths_jax.control.entry import Entry
 from martths_jax.errors import InputError
 
 
@@ -24,13 +26,13 @@ class Scalar:
     """A scalar that can be an axis.
 
     Attributes:
-        setting: what it sets: a setting of the controller (``nb``, ``no``, ``pull``, ``q``) or of
-            the study (``scale``, ``fs``, ``spread``, ``noise_power``, ``alpha``, ``p``).
+        setting: what it sets: a setting of the study, of its coupler, or of controllers.
         good: whether a value can be used.
         wanted: what it must be, to complete "must ...".
         unit: of the values.
         label: for axes of figures and for the result file.
         whole: whether values are whole numbers.
+        own: whether it is the controllers'.
     """
 
     setting: str
@@ -39,27 +41,15 @@ class Scalar:
     unit: str
     label: str
     whole: bool = False
-
-
-def _between(low: float, high: float) -> Callable[[float], bool]:
-    return lambda value: is_number(value) and low <= value <= high
+    own: bool = False
 
 
 def _at_least(low: float) -> Callable[[float], bool]:
     return lambda value: is_number(value) and value >= low
 
 
-SCALARS = {
-    "nb": Scalar("nb", _at_least(9), "be a whole number of at least 9", "samples",
-                 "buffer length Nb", whole=True),
-    "no": Scalar("no", _at_least(0), "be a whole number of at least 0", "samples",
-                 "overlap No", whole=True),
-    "no_fraction": Scalar("no", _between(0, 1), "lie between 0 and 1", "1", "overlap No / Nb"),
-    "hop": Scalar("no", _at_least(1), "be a whole number of at least 1", "samples",
-                  "hop Nb - No", whole=True),
-    "fb": Scalar("no", is_positive, "be positive", "Hz", "update rate f_b"),
-    "lambda": Scalar("pull", _at_least(0), "be zero or positive", "mm^2", "pull lambda"),
-    "q": Scalar("q", is_positive, "be positive", "mm^2", "process noise q"),
+#: Axes of the study itself, whatever controllers run.
+STUDY = {
     "scale": Scalar("scale", lambda v: is_number(v) and v != 0, "be a finite factor but not zero",
                     "1", "scale of the motion"),
     "noise_power": Scalar("noise_power", _at_least(0), "be zero or positive", "mm^2 s",
@@ -71,16 +61,51 @@ SCALARS = {
     "spread": Scalar("spread", _at_least(0), "be zero or positive", "1",
                      "spread of the plant's parameters"),
 }  # fmt: skip
-#: Four ways to say the overlap; a sweep uses one of them.
-OVERLAPS = ("no", "no_fraction", "hop", "fb")
-_ALIASES = {"pull": "lambda"}
-_REFUSED = {
-    "forgetting": (
-        "Axis `forgetting` cannot be run: this ADFC fits the last Nb rows with equal weights "
-        "(the paper's sliding window) and has no forgetting factor; `nb` sets how long it remembers"
-        " and `lambda` how strongly it is pulled back."
-    )
-}
+
+
+def scalars(entries: Iterable[Entry] = ENTRIES) -> dict[str, Scalar]:
+    """Everything that can be an axis of a study of these controllers, by name.
+
+    Args:
+        entries: of the controllers; of all of ours by default.
+    """
+    found: dict[str, Scalar] = {}
+    for entry in entries:
+        about = {p.name: p for p in entry.parameters} | {
+            d.name: d.as_parameter for d in entry.derived
+        }
+        for name, of in own_names(entry).items():
+            one = next(p for p in about.values() if name in (*_names(entry, p), p.name))
+            wanted = one.wanted.partition(" (")[0]
+            found.setdefault(
+                name, Scalar(of, one.good, wanted, one.unit, one.title, one.whole, True)
+            )
+    return found | STUDY
+
+
+def own_names(entry: Entry) -> dict[str, str]:
+    """Axes of an entry -> the parameter that each sets.
+
+    A parameter that is called like an axis of the study is CONTROLLER.PARAMETER as an axis.
+    """
+    found = {name: p.name for p in entry.parameters if p.is_number for name in _names(entry, p)}
+    return found | {d.name: d.of for d in entry.derived}
+
+
+def _names(entry: Entry, parameter) -> tuple[str, ...]:
+    name = parameter.axis or parameter.name
+    return (f"{entry.name}.{name}" if name in STUDY else name,)
+
+
+def ways(entries: Iterable[Entry]) -> dict[str, tuple[str, ...]]:
+    """Parameters that several axes set -> these axes, of which a sweep uses one."""
+    found: dict[str, dict[str, None]] = {}
+    for entry in entries:
+        for derived in entry.derived:
+            found.setdefault(derived.of, {derived.of: None})[derived.name] = None
+    return {of: tuple(names) for of, names in found.items()}
+
+
 _RANGE = re.compile(r"([^:]+):([^:]+):(lin|log)(\d+)")
 
 
@@ -89,17 +114,14 @@ class Axis:
     """One axis of a grid.
 
     Attributes:
-        name: one of ``SCALARS``.
+        name: of one of ``scalars``.
         values: distinct, in the order given.
+        scalar: what it moves.
     """
 
     name: str
     values: tuple[float, ...]
-
-    @property
-    def scalar(self) -> Scalar:
-        """What it moves."""
-        return SCALARS[self.name]
+    scalar: Scalar
 
     def text(self, value: float) -> str:
         """A value as tables show it."""
@@ -118,60 +140,72 @@ def split_axis(text: str) -> tuple[str, str]:
     return name, values
 
 
-def make_axes(given: Mapping | Iterable) -> tuple[tuple[Axis, ...], list[str]]:
+def make_axes(
+    given: Mapping | Iterable, entries: Iterable[Entry] = ENTRIES
+) -> tuple[tuple[Axis, ...], list[str]]:
     """Axes from names and values, and sentences about all that cannot be used.
 
     Args:
+        entries: of the controllers that run.
         given: mapping of names to values, or pairs of them, or texts ``NAME=VALUES``; values are
             numbers or a text as on the command line.
     """
     axes: list[Axis] = []
     problems: list[str] = []
+    known = scalars(entries)
     items = given.items() if isinstance(given, Mapping) else given
     for item in items:
         try:
             raw, values = split_axis(item) if isinstance(item, str) else item
-            name = canonical(raw)
+            name = canonical(raw, known, entries)
             if any(axis.name == name for axis in axes):
                 raise InputError(f"Axis `{name}` is given twice; give its values once.")
-            axes.append(Axis(name, axis_values(name, values)))
+            axes.append(Axis(name, axis_values(name, values, known[name]), known[name]))
         except InputError as error:
             problems.append(str(error))
-    ways = [axis.name for axis in axes if axis.name in OVERLAPS]
-    if len(ways) > 1:
-        problems.append(
-            f"Axes {' and '.join(f'`{w}`' for w in ways)} all set the overlap No; give one of them."
-        )
+    for of, names in ways(entries).items():
+        several = [axis.name for axis in axes if axis.name in names]
+        if len(several) > 1:
+            listed = " and ".join(f"`{name}`" for name in several)
+            what = known[of].label
+            problems.append(f"Axes {listed} all set the {what}; give one of them.")
     if not axes and not problems:
         problems.append("A sweep needs at least one axis, such as nb=128,256 or scale=0.1:1:lin5.")
     return tuple(axes), problems
 
 
-def canonical(name: str) -> str:
-    """Name of an axis in ``SCALARS``.
+def canonical(name: str, known: Mapping[str, Scalar], entries: Iterable[Entry] = ()) -> str:
+    """Name of an axis among the known ones.
+
+    Args:
+        name: as a user writes it; a parameter may be called as in settings or as on axes.
+        known: from ``scalars``.
+        entries: of the controllers that run.
 
     Raises:
         InputError: with the nearest names, if there is none such.
     """
     plain = str(name).strip().lower().replace("-", "_")
-    plain = _ALIASES.get(plain, plain)
-    if plain in _REFUSED:
-        raise InputError(_REFUSED[plain])
-    if plain not in SCALARS:
-        near = difflib.get_close_matches(plain, list(SCALARS), n=3)
-        hint = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(SCALARS)}"
+    aliases = {p.name: p.axis for entry in entries for p in entry.parameters if p.axis}
+    plain = aliases.get(plain, plain)
+    exact = str(name).strip()
+    if exact in known:
+        return exact
+    if plain not in known:
+        near = difflib.get_close_matches(plain, list(known), n=3)
+        hint = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(known)}"
         raise InputError(f"Axis {name!r} is unknown; {hint}.")
     return plain
 
 
-def axis_values(name: str, given) -> tuple[float, ...]:
+def axis_values(name: str, given, scalar: Scalar) -> tuple[float, ...]:
     """The values of an axis, each of the kind its scalar has.
 
     Raises:
         InputError: naming every value that cannot be used or is given twice, or an empty list.
     """
-    values = _parse(name, given) if isinstance(given, str) else np.ravel(given).tolist()
-    scalar = SCALARS[name]
+    whole = scalar.whole
+    values = _parse(name, given, whole) if isinstance(given, str) else np.ravel(given).tolist()
     if not values:
         raise InputError(f"Axis `{name}` has no values; give at least one.")
     bad = [v for v in values if not scalar.good(v) or (scalar.whole and v != int(v))]
@@ -192,7 +226,7 @@ def axis_values(name: str, given) -> tuple[float, ...]:
     return tuple(int(v) if scalar.whole else float(v) for v in values)
 
 
-def _parse(name: str, text: str) -> list[float]:
+def _parse(name: str, text: str, whole: bool) -> list[float]:
     text = text.strip()
     match = _RANGE.fullmatch(text)
     try:
@@ -210,4 +244,4 @@ def _parse(name: str, text: str) -> list[float]:
         raise InputError(f"Axis `{name}` must run between finite numbers in at most 10 000 steps.")
     spaced = np.geomspace if match[3] == "log" else np.linspace
     values = spaced(low, high, count)
-    return (np.round(values) if SCALARS[name].whole else values).tolist()
+    return (np.round(values) if whole else values).tolist()

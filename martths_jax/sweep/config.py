@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from martths_jax.campaign.config import StudyConfig, make_config, read_toml, unknown_names
+from martths_jax.control.controllers import ENTRIES
+from martths_jax.control.entry import Entry
 from martths_jax.errors import InputError, raise_all
 from martths_jax.indices import NAMES
 from martths_jax.motions import Motion
+from martths_jax.published import PROPOSED
 from martths_jax.sweep.axes import Axis, make_axes
-from martths_jax.sweep.grid import Grid, build_grid
+from martths_jax.sweep.grid import Grid, build_grid, entry_for
 
 #: What a sweep has where a study has another default.
-DEFAULTS = {"trials": 200, "controllers": ("adfc",), "out": "sweep", "signals": False}
+DEFAULTS = {"trials": 200, "controllers": PROPOSED, "out": "sweep", "signals": False}
 #: Indices that figures and summary show.
 SHOWN = ("J2_1", "J2_2", "J5_4", "J6_4", "J8_2")
 
@@ -65,7 +69,7 @@ def make_sweep(
     except InputError as error:
         study = None
         problems.append(str(error))
-    found, bad = make_axes(axes)
+    found, bad = make_axes(axes, _entries(study))
     problems += bad
     shown = tuple(dict.fromkeys(shown))
     problems += unknown_names([n for n in shown if n not in NAMES], set(NAMES), "Index")
@@ -77,6 +81,16 @@ def make_sweep(
             problems += bad
     raise_all(problems, "The sweep cannot be run")
     return SweepConfig(study, grid, shown)
+
+
+def _entries(study: StudyConfig | None) -> list[Entry]:
+    """Entries of the controllers that run, as far as they can be found; else of all of ours."""
+    found = []
+    for name in study.controllers if study is not None else ():
+        with contextlib.suppress(InputError):  # building the plan says what is wrong
+            if isinstance(name, str):
+                found.append(entry_for(name, study))
+    return found or list(ENTRIES)
 
 
 def _clashes(axes: tuple[Axis, ...], study: StudyConfig) -> list[str]:

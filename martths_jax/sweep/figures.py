@@ -11,8 +11,6 @@ from martths_jax.campaign.statistics import LEVEL, percentile, proportion
 from martths_jax.figures.style import (
     DOUBLE,
     Drawing,
-    controller_label,
-    controller_position,
     house_style,
     index_label,
     line,
@@ -23,7 +21,7 @@ from martths_jax.figures.style import (
 )
 from martths_jax.files import safe_name
 from martths_jax.indices import DELAYS
-from martths_jax.sweep.axes import OVERLAPS, Axis
+from martths_jax.sweep.axes import Axis
 from martths_jax.sweep.results import Sweep
 from martths_jax.watch import Status
 
@@ -73,11 +71,12 @@ def drawings(sweep: Sweep, shown: Sequence[str]) -> Iterator[tuple[str, Drawing]
 
 def map_axes(moving: Sequence[Axis]) -> tuple[Axis, Axis]:
     """The two axes of a heat map, the one that goes upwards first."""
-    overlap = next((a for a in moving if a.name in OVERLAPS), None)
-    buffer = next((a for a in moving if a.name == "nb"), None)
-    if overlap and buffer:
-        return overlap, buffer
-    return moving[1], moving[0]
+    own = [axis for axis in moving if axis.scalar.own]
+    # Two settings of a controller before what surrounds it; the count that comes first across.
+    first, second, *_ = own if len(own) > 1 else moving
+    whole = [axis for axis in (first, second) if axis.name == axis.scalar.setting]
+    across = whole[0] if whole else first
+    return (second if across is first else first), across
 
 
 def heat_map(
@@ -129,7 +128,7 @@ def heat_map(
     figure.supylabel(_axis_label(up), fontsize=7.5)
     caption = (
         f"Median and 95th percentile of the indices over the uncertain plants that finished, "
-        f"{controller_label(controller)} on {motion_label(motion)}"
+        f"{Names(sweep.dataset).label(controller)} on {motion_label(motion)}"
         + "".join(f", {k} = {v:g}" for k, v in fixed.items())
         + ". Printed in the cells: share of lost trials in percent; white: none finished."
     )
@@ -196,9 +195,9 @@ def lines(sweep: Sweep, axis: Axis, motion: str, shown: Sequence[str]) -> Drawin
             column.append(cell)
 
     values = np.array(axis.values, dtype=float)
-    order = np.argsort(values)
+    order, called = np.argsort(values), Names(sweep.dataset)
     for controller in names:
-        position = controller_position(controller, names)
+        position = called.position(controller)
         shape = look(position)
         for panel, name in zip(axes, shown, strict=False):
             sample = data.value.sel(controller=controller, index=name).transpose(axis.name, "trial")
@@ -209,7 +208,7 @@ def lines(sweep: Sweep, axis: Axis, motion: str, shown: Sequence[str]) -> Drawin
                     for k in ("low", "value", "high")
                 )
                 panel.fill_between(values[order], low, high, color=shape["color"], alpha=0.18, lw=0)
-                label = f"{controller_label(controller)}, {_WORDS[percent]}"
+                label = f"{called.label(controller)}, {_WORDS[percent]}"
                 panel.plot(values[order], middle, label=label, marker=shape["marker"], ms=2.4,
                            mfc="white" if percent == 95 else None, **line(position))  # fmt: skip
                 for value, e in zip(axis.values, found, strict=True):

@@ -1,26 +1,25 @@
 """From axes to runs: every cell of the grid, what it sets, and which cells can share a batch.
 
 A cell is one point of the grid.  A *job* is what a cell runs of one controller: cells that differ
-only in settings a controller does not have (LQG has no buffer) are the same job, run once.  Jobs
-that differ only in traced scalars (No, lambda, q, noise power) stand side by side in one batch.
+only in settings a controller does not have (a buffer) are the same job, run once.  Jobs
+that differ only in traced scalars (gains, weights, noise power) stand side by side in one batch.
 """
 
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from martths_jax.campaign.config import StudyConfig
-from martths_jax.campaign.plan import KINDS, defaults
-from martths_jax.sweep.axes import OVERLAPS, Axis
+from martths_jax.control.entry import Entry
+from martths_jax.control.registry import find
+from martths_jax.errors import InputError
+from martths_jax.sweep.axes import Axis, own_names
 
-#: Settings of a job that shape a batch: what must be the same for all its lanes.
-SHARED = ("fs", "alpha", "p", "scale", "spread", "nb")
-#: Settings that may differ from lane to lane.
-LANE = ("no", "pull", "q", "noise_power")
+#: Settings of a study that may differ from lane to lane; all others shape a batch.
+LANE = ("noise_power",)
 
 
 @dataclass(frozen=True)
@@ -30,10 +29,12 @@ class Job:
     Attributes:
         controller: its name.
         settings: (name, value) of everything an axis sets and this controller feels, sorted.
+        shaping: names of those that must be the same for all lanes of a batch.
     """
 
     controller: str
     settings: tuple[tuple[str, float], ...]
+    shaping: frozenset[str] = frozenset()
 
     def get(self, name: str, default=None):
         """A setting, or `default` where no axis sets it."""
@@ -42,7 +43,7 @@ class Job:
     @property
     def shared(self) -> tuple:
         """What all jobs of a batch have in common."""
-        return self.controller, tuple((k, v) for k, v in self.settings if k in SHARED)
+        return self.controller, tuple((k, v) for k, v in self.settings if k in self.shaping)
 
     @property
     def label(self) -> str:
@@ -86,134 +87,140 @@ def kind_of(name: str, config: StudyConfig) -> str:
     return config.controller.get(name, {}).get("kind", name)
 
 
+def entry_for(name: str, config: StudyConfig) -> Entry:
+    """The entry of a controller named in a configuration.
+
+    Raises:
+        InputError: if there is none.
+    """
+    return find(kind_of(name, config)).entry
+
+
 def settings_of(name: str, config: StudyConfig) -> dict:
     """Settings of a controller: those of its table, else the defaults of its kind."""
     table = config.controller.get(name, {})
-    return defaults(kind_of(name, config)) | {k: v for k, v in table.items() if k != "kind"}
-
-
-def overlap(way: str, value: float, nb: int, fs: float) -> int:
-    """Overlap No [samples] from the value of one of ``OVERLAPS``; may be impossible.
-
-    A fraction of 1 is every sample, No = Nb - 1.
-    """
-    if way == "no":
-        return int(value)
-    if way == "hop":
-        return nb - int(value)
-    if way == "fb":
-        return nb - math.floor(fs / value + 0.5)
-    return min(math.floor(value * nb + 0.5), nb - 1)
+    own = {k: v for k, v in table.items() if k != "kind"}
+    return entry_for(name, config).defaults | own
 
 
 def build_grid(axes: tuple[Axis, ...], config: StudyConfig) -> tuple[Grid, list[str]]:
     """The grid, and sentences about every combination that makes no sense."""
     problems: list[str] = []
     jobs: dict[str, tuple[Job, ...]] = {}
-    names = [axis.name for axis in axes]
-    felt: set[str] = set()
+    felt = {axis.name for axis in axes if not axis.scalar.own}
     for controller in config.controllers:
-        if kind_of(controller, config) not in KINDS:
+        try:
+            entry = entry_for(controller, config)
+        except InputError:
             continue  # build_plan says so
-        own = settings_of(controller, config)
-        cells = []
+        found = []
         for place in itertools.product(*(axis.values for axis in axes)):
-            values = dict(zip(names, place, strict=True))
-            cells.append(_job(controller, own, values, config, problems))
-        jobs[controller] = tuple(cells)
-        felt |= {
-            a.name for a in axes if a.scalar.setting in own or a.scalar.setting not in _CONTROLLERS
-        }
-        problems += _rounded_alike(axes, own, config)
-    for name in names:
-        if jobs and name not in felt:
+            job, sentences = _job(controller, entry, axes, place, config)
+            found.append(job)
+            problems += sentences
+        jobs[controller] = tuple(found)
+        felt |= {axis.name for axis in axes} & set(own_names(entry))
+        problems += _alike(axes, entry, jobs[controller])
+    for axis in axes:
+        if jobs and axis.name not in felt:
             problems.append(
-                f"Axis `{name}` moves nothing: no controller of {', '.join(jobs)} has it."
+                f"Axis `{axis.name}` moves nothing: no controller of {', '.join(jobs)} has it."
             )
     return Grid(axes, jobs), list(dict.fromkeys(problems))
 
 
-_CONTROLLERS = {"nb", "no", "pull", "q"}
-
-
-def _job(controller: str, own: dict, values: dict, config: StudyConfig, problems: list) -> Job:
-    """What a controller runs in a cell; adds a sentence if it cannot be."""
-    found: dict[str, float] = {}
-    for name, value in values.items():
-        if name in OVERLAPS or name == "nb":
-            continue
-        setting = {"lambda": "pull"}.get(name, name)
-        if setting not in _CONTROLLERS or setting in own:
-            found[setting] = value
-    way = next((w for w in OVERLAPS if w in values), None)
-    if "nb" in own and ("nb" in values or way):
-        nb, fs = int(values.get("nb", own["nb"])), values.get("fs", config.fs)
-        if way:
-            no = overlap(way, values[way], nb, fs)
-        else:  # the controller's own; every sample stays every sample
-            no = nb - 1 if own["no"] == own["nb"] - 1 else own["no"]
-        if not 0 <= no <= nb - 1:
-            given = f"{way} = {values[way]:g}" if way else f"no = {no} of {controller}"
-            rate = f" at fs = {fs:g} Hz" if way == "fb" else ""
-            problems.append(
-                f"Nb = {nb} with {given}{rate} gives No = {no} (hop {nb - no}); "
-                f"No must lie in 0 ... {nb - 1}."
-            )
-        found |= {"nb": nb, "no": no}
-    return Job(controller, tuple(sorted(found.items())))
-
-
-def _rounded_alike(axes, own: dict, config: StudyConfig) -> list[str]:
-    """Sentences about overlaps that are the same number of samples."""
-    by_name = {axis.name: axis.values for axis in axes}
-    way = next((w for w in OVERLAPS if w in by_name), None)
-    if way is None or "nb" not in own:
-        return []
+def _job(controller: str, entry: Entry, axes, place, config) -> tuple[Job, list[str]]:
+    """What a controller runs in a cell, and sentences if it cannot be."""
+    own = settings_of(controller, config)
+    values = {axis.name: value for axis, value in zip(axes, place, strict=True)}
+    surroundings = {a.scalar.setting: values[a.name] for a in axes if not a.scalar.own}
+    fs = surroundings.get("fs", config.fs)
+    plain, derived = own_names(entry), {d.name: d for d in entry.derived}
+    changed = {plain[n]: v for n, v in values.items() if n in plain and n not in derived}
+    for name in values:
+        if name in derived:
+            changed[derived[name].of] = derived[name].value(values[name], own | changed, fs)
+    moved = bool(changed)
+    changed |= entry.followed(own, changed)
     problems = []
-    for nb, fs in itertools.product(
-        by_name.get("nb", (own["nb"],)), by_name.get("fs", [config.fs])
-    ):
-        where: dict[int, list[float]] = {}
-        for value in by_name[way]:
-            where.setdefault(overlap(way, value, int(nb), fs), []).append(value)
-        problems += [
-            f"Nb = {nb}: {way} = {' and '.join(f'{v:g}' for v in values)} are all No = {no}, "
-            "a duplicate cell."
-            for no, values in where.items()
-            if len(values) > 1
+    if moved:
+        mine = [f"{n} = {v:g}" for n, v in values.items() if n in plain]
+        rate = f" at fs = {fs:g} Hz" if any(n in derived for n in values) else ""
+        problems = [
+            f"Cell {', '.join(mine)}{rate} of {controller} cannot run: {text}"
+            for text in entry.clashes(own | changed)
         ]
+    numbers = {k: v for k, v in changed.items() if entry.parameter(k).is_number}
+    static = {p.name for p in entry.parameters if p.kind == "static"}
+    keys = {k: k if k not in surroundings else f"{entry.name}.{k}" for k in numbers}
+    settings = surroundings | {keys[k]: v for k, v in numbers.items()}
+    shaping = {k for k in surroundings if k not in LANE} | {keys[k] for k in static & set(numbers)}
+    return Job(controller, tuple(sorted(settings.items())), frozenset(shaping)), problems
+
+
+def _alike(axes: tuple[Axis, ...], entry: Entry, jobs: tuple[Job, ...]) -> list[str]:
+    """Sentences about values of a derived axis that come to the same parameter."""
+    problems = []
+    places = list(itertools.product(*(axis.values for axis in axes)))
+    for at, axis in enumerate(axes):
+        derived = next((d for d in entry.derived if d.name == axis.name), None)
+        if derived is None:
+            continue
+        same: dict[tuple, list[float]] = {}
+        for place, job in zip(places, jobs, strict=True):
+            same.setdefault((place[:at], place[at + 1 :], job), []).append(place[at])
+        for (*_, job), values in same.items():
+            if len(values) > 1:
+                rest = ", ".join(f"{k} = {v:g}" for k, v in job.settings if k != derived.of)
+                problems.append(
+                    f"Axis `{axis.name}`: {' and '.join(f'{v:g}' for v in values)} all give "
+                    f"{derived.of} = {job.get(derived.of)}{f' with {rest}' if rest else ''}, a "
+                    "duplicate cell."
+                )
     return problems
 
 
 def job_config(job: Job, config: StudyConfig) -> StudyConfig:
     """The study configuration whose controller, motions, plants and noise a job has.
 
-    An axis changes its own scalar and nothing else: where lambda moves, the fit is still pulled
-    towards what the controller of the table would be pulled to.
+    An axis changes its own scalar and what the controller says must follow, and nothing else.
     """
-    settings = dict(job.settings)
-    table = dict(config.controller.get(job.controller, {}))
-    own = settings_of(job.controller, config)
-    if "pull" in settings and not own.get("towards"):
-        table["towards"] = "inverse" if own["pull"] is None else "start"
-    table |= {k: settings[k] for k in _CONTROLLERS if k in settings}
-    changes = {k: settings[k] for k in ("scale", "fs", "spread", "noise_power") if k in settings}
+    entry, own = entry_for(job.controller, config), settings_of(job.controller, config)
+    names = {p.name for p in entry.parameters}
+    changed = {}
+    for key, value in job.settings:
+        name = key.removeprefix(f"{entry.name}.")
+        if name in names and (key not in _STUDY or name != key):
+            changed[name] = value
+    table = dict(config.controller.get(job.controller, {})) | changed
+    table |= entry.followed(own, changed)
+    changes = {k: v for k, v in job.settings if k in _STUDY}
     tables = dict(config.controller) | {job.controller: table}
     return replace(config, controllers=(job.controller,), controller=tables, **changes)
 
 
-def cell_numbers(grid: Grid, config: StudyConfig) -> dict[str, np.ndarray]:
-    """Nb, No, hop and update rate of every cell and controller; NaN for one without a buffer.
+#: Settings of ``StudyConfig`` that an axis can set.
+_STUDY = ("scale", "fs", "spread", "noise_power")
+
+
+def cell_numbers(grid: Grid, config: StudyConfig) -> dict[str, tuple[np.ndarray, str, str]]:
+    """Numbers that shape the controllers of every cell: counts, and what else derives from them.
 
     Returns:
-        ``cell_nb``, ``cell_no``, ``cell_hop`` [samples], ``cell_fb`` [Hz], (*axes, controller).
+        ``cell_NAME`` -> ((*axes, controller) values, NaN for a controller without; label; unit).
     """
-    numbers = np.full((4, *grid.shape, len(grid.jobs)), np.nan)
-    flat = numbers.reshape(4, -1, len(grid.jobs))
+    found: dict[str, tuple[np.ndarray, str, str]] = {}
     for j, (controller, jobs) in enumerate(grid.jobs.items()):
-        own = settings_of(controller, config)
-        for i, job in enumerate(jobs):
-            if "nb" in own:
-                nb, no = job.get("nb", own["nb"]), job.get("no", own["no"])
-                flat[:, i, j] = nb, no, nb - no, job.get("fs", config.fs) / (nb - no)
-    return dict(zip(("cell_nb", "cell_no", "cell_hop", "cell_fb"), numbers, strict=True))
+        entry, own = entry_for(controller, config), settings_of(controller, config)
+        shown = [p for p in entry.parameters if p.is_number and p.unit == "samples"]
+        for one in [*shown, *(d for d in entry.derived if d.of_cell is not None)]:
+            name = f"cell_{one.name}"
+            blank = np.full((*grid.shape, len(grid.jobs)), np.nan)
+            values = found.setdefault(name, (blank, one.label, one.unit))[0]
+            flat = values.reshape(-1, len(grid.jobs))
+            for i, job in enumerate(jobs):
+                settings = own | {k: job.get(k, v) for k, v in own.items()}
+                fs = job.get("fs", config.fs)
+                derived = getattr(one, "of_cell", None)
+                flat[i, j] = derived(settings, fs) if derived else settings[one.name]
+    return found

@@ -24,18 +24,11 @@ from martths_jax.campaign.store import RunFolder
 from martths_jax.indices import NAMES
 from martths_jax.plant import PARAMETERS
 from martths_jax.study.summary import Summary, Table, extent, number
-from martths_jax.sweep.axes import SCALARS, Axis
+from martths_jax.sweep.axes import Axis, Scalar
 from martths_jax.sweep.config import SHOWN, SweepConfig
 from martths_jax.sweep.grid import cell_numbers
 from martths_jax.text import counted, csv_field
 from martths_jax.watch import Status
-
-_CELL_WORDS = {
-    "cell_nb": ("buffer length Nb of a cell; NaN for a controller without", "samples"),
-    "cell_no": ("overlap No of a cell", "samples"),
-    "cell_hop": ("samples between new coefficients, Nb - No", "samples"),
-    "cell_fb": ("update rate of the coefficients", "Hz"),
-}
 
 
 @dataclass(frozen=True)
@@ -55,8 +48,15 @@ class Sweep:
         """The axes of the grid."""
         found = []
         for name in self.dataset.value.dims[: self.dataset.value.ndim - 4]:
-            kind = int if SCALARS[name].whole else float
-            found.append(Axis(name, tuple(kind(v) for v in self.dataset[name].values)))
+            stored = self.dataset[name]
+            about = stored.attrs
+            whole = stored.dtype.kind == "i"
+            scalar = Scalar(
+                about["setting"], lambda v: True, "", about["units"], about["long_name"], whole,
+                bool(np.ravel(about["own"])[0]),
+            )  # fmt: skip
+            kind = int if whole else float
+            found.append(Axis(name, tuple(kind(v) for v in stored.values), scalar))
         return tuple(found)
 
     @property
@@ -152,12 +152,13 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         variables[f"first_{name}"] = ((*cell, "actuator"), gather(lambda o, i=i: o.first[:, i]), {
             "long_name": f"first sample of `{name}` (see Watch); NaN = never",
             "units": "samples"})  # fmt: skip
-    for name, values in cell_numbers(grid, config.study).items():
-        text, unit = _CELL_WORDS[name]
-        variables[name] = ((*names, "controller"), values, {"long_name": text, "units": unit})
+    for name, (values, text, unit) in cell_numbers(grid, config.study).items():
+        words = {"long_name": f"{text} of a cell; NaN for a controller without", "units": unit}
+        variables[name] = ((*names, "controller"), values, words)
     coordinates = {
         axis.name: (axis.name, np.array(axis.values),
-                    {"long_name": axis.scalar.label, "units": axis.scalar.unit})
+                    {"long_name": axis.scalar.label, "units": axis.scalar.unit,
+                     "setting": axis.scalar.setting, "own": int(axis.scalar.own)})
         for axis in grid.axes
     } | {
         "controller": np.array(list(grid.jobs)),

@@ -115,7 +115,7 @@ def build(sweep: SweepConfig) -> tuple[Plan, Worlds, dict[Job, object]]:
             try:
                 benchmark = worlds.benchmark(*_place(job, config))
                 worlds.motions(config.fs, job.get("scale"))
-                controllers[job] = build_controller(job.controller, config, benchmark)[0]
+                controllers[job] = build_controller(job.controller, config, benchmark).controller
             except InputError as error:
                 problems.append(str(error))
     for spread in sweep.axis("spread") or ():

@@ -222,6 +222,24 @@ def _overlap(nb: int, value: float) -> int:
     return min(math.floor(value * nb + 0.5), nb - 1)
 
 
+def _follow(own, changed) -> dict:
+    """A fit every sample stays one; a pull that moves still goes where the default's goes."""
+    found = {}
+    if "nb" in changed and "no" not in changed:
+        every = own["no"] == own["nb"] - 1
+        found["no"] = changed["nb"] - 1 if every else own["no"]
+    if "pull" in changed and not own["towards"]:
+        found["towards"] = "inverse" if own["pull"] is None else "start"
+    return found
+
+
+def _clash(own) -> list[str]:
+    nb, no = own["nb"], own["no"]
+    if 0 <= no <= nb - 1:
+        return []
+    return [f"No = {no} (hop {nb - no}) must lie in 0 ... {nb - 1}."]
+
+
 ENTRY = Entry(
     name="adfc",
     controller=ADFC,
@@ -240,9 +258,11 @@ ENTRY = Entry(
         Derived("no_fraction", "no", lambda v, own, fs: _overlap(own["nb"], v),
                 "overlap No / Nb", "1", 0.0, 1.0),
         Derived("hop", "no", lambda v, own, fs: own["nb"] - int(v),
-                "hop Nb - No", "samples", 1, whole=True),
+                "hop Nb - No", "samples", 1, whole=True,
+                of_cell=lambda own, fs: own["nb"] - own["no"]),
         Derived("fb", "no", lambda v, own, fs: own["nb"] - math.floor(fs / v + 0.5),
-                "update rate f_b", "Hz", 0.0, above=True),
+                "update rate f_b", "Hz", 0.0, above=True,
+                of_cell=lambda own, fs: fs / (own["nb"] - own["no"])),
     ),
     tuned=(
         Parameter("pull", "lambda", "pull", GUARD_PULL, "mm^2", 0.0, above=True),
@@ -250,6 +270,8 @@ ENTRY = Entry(
     ),
     traced=lambda benchmark, **values: ADFC(towards="inverse", **values).prepare(benchmark),
     settings_from=lambda values: {**values, "towards": "inverse"},
+    follow=_follow,
+    clash=_clash,
     look=1,
 )  # fmt: skip
 
