@@ -35,7 +35,7 @@ class Comparison:
     each: dict[str, dict[str, dict[str, float]]]
 
     def rows(self) -> list[dict[str, object]]:
-        """One row an index and controller: ours, published, deviation [%]; blank where not in print."""
+        """One row an index and controller: ours, published, deviation [%] if there is one."""
         found = []
         for controller, values in self.ours.items():
             for name in NAMES:

@@ -237,7 +237,10 @@ def build_controller(given, config: StudyConfig, benchmark: Benchmark) -> Chosen
         return Chosen(given, find_class(kind), identity)
     table = dict(config.controller.get(given, {}))
     kind = table.pop("kind", given)
-    guest = find(kind)
+    try:
+        guest = find(kind)
+    except InputError as error:
+        raise InputError(f"Controller {given!r}: {error}" if kind != given else str(error)) from None
     entry = guest.entry
     known = entry.defaults
     raise_all(unknown_names(sorted(set(table) - set(known)), set(known), f"Setting of {given}"))

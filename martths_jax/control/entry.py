@@ -218,8 +218,7 @@ class Entry:
 
     def clashes(self, settings: Mapping[str, Any]) -> list[str]:
         """Sentences about settings out of range or that exclude each other."""
-        found = self.problems(settings)
-        return found or ([] if self.clash is None else self.clash(settings))
+        return ([] if self.clash is None else self.clash(settings)) or self.problems(settings)
 
     def build(self, benchmark, **settings) -> Controller:
         """The controller with some settings, not prepared.

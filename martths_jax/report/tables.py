@@ -12,7 +12,7 @@ import xarray as xr
 from martths_jax import published
 from martths_jax.campaign.statistics import PERCENTS, percentile
 from martths_jax.errors import argument_error
-from martths_jax.figures.style import index_label, motion_label
+from martths_jax.figures.style import Names, index_label, motion_label
 from martths_jax.indices import DELAYS, NAMES
 from martths_jax.study.summary import Table, number
 from martths_jax.text import csv_cell

@@ -11,6 +11,7 @@ from martths_jax.figures.style import (
     BLUE,
     DOUBLE,
     Drawing,
+    Names,
     house_style,
     index_label,
     new_figure,
@@ -82,8 +83,9 @@ def tornado(found: Sensitivity, controller: str, shown: Sequence[str]) -> Drawin
     drawn = [h for panel in axes for h in [panel.get_legend_handles_labels()] if h[0]]
     if drawn:
         figure.legend(*drawn[0], loc="outside upper center", ncols=2)
+    label = Names(found.dataset).label(controller)
     caption = (
-        f"Sobol' indices of {Names(found.dataset).label(controller)}: share of an index's variance that a "
+        f"Sobol' indices of {label}: share of an index's variance that a "
         f"factor moves alone (first order) and with all its interactions (total), with {LEVEL:.0%} "
         f"bootstrap confidence intervals, N = {one.used}."
     )

@@ -11,7 +11,7 @@ import difflib
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -121,7 +121,7 @@ class Axis:
 
     name: str
     values: tuple[float, ...]
-    scalar: Scalar
+    scalar: Scalar = field(compare=False)
 
     def text(self, value: float) -> str:
         """A value as tables show it."""
@@ -152,18 +152,19 @@ def make_axes(
     """
     axes: list[Axis] = []
     problems: list[str] = []
-    known = scalars(entries)
+    # Those of ours that do not run are known too, so that the grid can say that they move nothing.
+    known = scalars(ENTRIES) | scalars(entries)
     items = given.items() if isinstance(given, Mapping) else given
     for item in items:
         try:
             raw, values = split_axis(item) if isinstance(item, str) else item
-            name = canonical(raw, known, entries)
+            name = canonical(raw, known, [*ENTRIES, *entries])
             if any(axis.name == name for axis in axes):
                 raise InputError(f"Axis `{name}` is given twice; give its values once.")
             axes.append(Axis(name, axis_values(name, values, known[name]), known[name]))
         except InputError as error:
             problems.append(str(error))
-    for of, names in ways(entries).items():
+    for of, names in ways([*ENTRIES, *entries]).items():
         several = [axis.name for axis in axes if axis.name in names]
         if len(several) > 1:
             listed = " and ".join(f"`{name}`" for name in several)

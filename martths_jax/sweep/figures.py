@@ -11,6 +11,7 @@ from martths_jax.campaign.statistics import LEVEL, percentile, proportion
 from martths_jax.figures.style import (
     DOUBLE,
     Drawing,
+    Names,
     house_style,
     index_label,
     line,

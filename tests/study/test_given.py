@@ -116,12 +116,12 @@ def test_looks_do_not_repeat():
 def test_pairs_follow_kinds():
     def compared(**kinds):
         tables = {name: {"kind": kind} for name, kind in kinds.items()}
-        about = {"identity": json.dumps({"controller": tables})}
+        about = {"controllers": json.dumps(tables)}
         return pairs(xr.Dataset(coords={"controller": list(kinds)}, attrs=about))
 
     assert compared(lqg="lqg", adfc="adfc", passthrough="passthrough") == [("adfc", "lqg")]
     assert compared(slow="adfc", adfc="adfc", lqg="lqg") == [("adfc", "lqg"), ("slow", "adfc")]
-    assert compared(a="ADFC", b="LQG", c="ADFC") == [("a", "b"), ("c", "a")]
+    assert compared(a="adfc", b="lqg", c="adfc") == [("a", "b"), ("c", "a")]
     assert compared(a="adfc") == compared(a="adfc", b="passthrough") == []
     assert pairs(xr.Dataset(coords={"controller": ["lqg", "adfc"]})) == [("adfc", "lqg")]
 

@@ -5,9 +5,23 @@ import pytest
 
 from martths_jax import InputError
 from martths_jax.campaign.config import make_config
+from martths_jax.control.registry import find
 from martths_jax.sweep import make_sweep, run_sweep
-from martths_jax.sweep.axes import SCALARS, axis_values
-from martths_jax.sweep.grid import cell_numbers, job_config, overlap
+from martths_jax.sweep.axes import axis_values as values_of
+from martths_jax.sweep.axes import scalars
+from martths_jax.sweep.grid import cell_numbers, job_config
+
+
+def axis_values(name, given):
+    return values_of(name, given, scalars()[name])
+
+
+def overlap(way, value, nb, fs):
+    """No from one of the ways to say it."""
+    if way == "no":
+        return value
+    derived = next(d for d in find("adfc").entry.derived if d.name == way)
+    return derived.value(value, {"nb": nb}, fs)
 
 
 def test_ranges_and_lists():
@@ -28,8 +42,8 @@ def test_ranges_and_lists():
         ("nb", "64,128,64", "64 more than once"),
         ("nb", "8,64,64", "at least 9 (samples), but got 8.  Axis `nb` has 64 more than once"),
         ("hop", "0,1", "at least 1"),
-        ("no_fraction", "0.5,1.2", "lie between 0 and 1, but got 1.2"),
-        ("lambda", "-1e-8", "zero or positive"),
+        ("no_fraction", "0.5,1.2", "be a number from 0 to 1, but got 1.2"),
+        ("lambda", "-1e-8", "be a number of at least 0 (mm^2)"),
         ("lambda", "0:1:log5", "must be positive"),
         ("q", "a,b", "must be numbers"),
         ("scale", "0:1:lin3", "not zero"),
@@ -46,14 +60,13 @@ def test_refused_values(name, text, part):
 def test_everything_wrong_is_named_at_once_and_before_anything_runs(tmp_path):
     with pytest.raises(InputError) as caught:
         run_sweep(
-            [("nb", "64,128"), ("no", "32,64,100,127"), ("lamda", "1"), ("forgetting", "0.9"),
+            [("nb", "64,128"), ("no", "32,64,100,127"), ("lamda", "1"),
              ("nb", "256"), ("q", "")],
             {"seed": -1}, shown=("J2_1", "J2_9"), out=str(tmp_path / "out"),
         )  # fmt: skip
     text = str(caught.value)
     for part in (
         "Axis 'lamda' is unknown; the nearest are lambda",
-        "no forgetting factor",
         "`nb` is given twice",
         "`q` has no values",
         "Argument `seed`",
@@ -68,21 +81,21 @@ def test_impossible_combinations_are_all_named():
         make_sweep({"nb": (64, 128), "no": (32, 64, 127, 200)})
     text = str(caught.value)
     for nb, no in ((64, 64), (64, 127), (64, 200), (128, 200)):
-        assert f"Nb = {nb} with no = {no} " in text
-    assert text.count("Nb = ") == 4, "and no possible one"
+        assert f"Cell nb = {nb}, no = {no} of adfc cannot run" in text
+    assert text.count("Cell nb = ") == 4, "and no possible one"
 
 
 @pytest.mark.parametrize(
     ("axes", "changes", "part"),
     [
         ({}, {}, "at least one axis"),
-        ({"nb": 16, "no_fraction": (0.95, 1)}, {}, "all No = 15"),
-        ({"nb": 64, "hop": (65,)}, {}, "gives No = -1"),
+        ({"nb": 16, "no_fraction": (0.95, 1)}, {}, "all give no = 15"),
+        ({"nb": 64, "hop": (65,)}, {}, "No = -1 (hop 65) must lie in 0 ... 63"),
         ({"nb": 64, "fb": (1, 64)}, {}, "at fs = 1024 Hz"),
         ({"no": 3, "hop": 4}, {}, "all set the overlap"),
         ({"nb": 64}, {"controllers": ("lqg",)}, "moves nothing"),
         ({"scale": (1, 2)}, {"pga": "0.4g"}, "exclude each other"),
-        ({"nb": 64}, {"controller": {"adfc": {"no": 500}}}, "no = 500 of adfc"),
+        ({"nb": 64}, {"controller": {"adfc": {"no": 500}}}, "No = 500 "),
     ],
 )
 def test_refused_sweeps(axes, changes, part):
@@ -97,9 +110,9 @@ def test_four_ways_to_say_the_overlap_agree():
     assert overlap("no_fraction", 1, 64, 1024) == 63, "1 is every sample"
     sweep = make_sweep({"nb": (64, 128), "no_fraction": (0, 1)})
     numbers = cell_numbers(sweep.grid, sweep.study)
-    assert numbers["cell_no"][..., 0].tolist() == [[0, 63], [0, 127]]
-    assert numbers["cell_hop"][..., 0].tolist() == [[64, 1], [128, 1]]
-    assert numbers["cell_fb"][..., 0].tolist() == [[16, 1024], [8, 1024]]
+    assert numbers["cell_no"][0][..., 0].tolist() == [[0, 63], [0, 127]]
+    assert numbers["cell_hop"][0][..., 0].tolist() == [[64, 1], [128, 1]]
+    assert numbers["cell_fb"][0][..., 0].tolist() == [[16, 1024], [8, 1024]]
 
 
 def test_every_sample_stays_every_sample_where_only_nb_moves():
@@ -113,7 +126,7 @@ def test_cells_share_batches_and_jobs():
         controllers=("adfc", "lqg", "passthrough"),
     ).grid
     sizes = sorted(len(batch) for batch in grid.batches())
-    assert sizes == [2, 2, 8, 8], "passthrough and lqg with their q, ADFC with each nb"
+    assert sizes == [1, 1, 2, 8, 8], "passthrough's q shapes it; lqg with its q, ADFC with each nb"
     assert len(grid.places) == 16 == len(grid.jobs["passthrough"])
 
 
@@ -130,4 +143,4 @@ def test_an_axis_changes_its_own_scalar_only():
 
 def test_every_scalar_sets_something_known():
     settings = {"nb", "no", "pull", "q", "scale", "fs", "spread", "noise_power", "alpha", "p"}
-    assert {s.setting for s in SCALARS.values()} == settings
+    assert {s.setting for s in scalars().values()} == settings
