@@ -11,14 +11,18 @@ print(indices(result)["J2_1"].mean())
 from martths_jax import runtime  # first: float64 and the devices are set before JAX starts
 from martths_jax._version import __version__
 from martths_jax.benchmark import Benchmark, build_benchmark
-from martths_jax.control.controllers import (
-    ADFC,
-    LQG,
+from martths_jax.control.base import (
     Controller,
     Decision,
+    DelayLine,
+    Estimator,
     Observation,
-    Passthrough,
+    Signal,
 )
+from martths_jax.control.compensator import Compensator
+from martths_jax.control.controllers import ADFC, LQG, Passthrough
+from martths_jax.control.entry import Entry, Parameter
+from martths_jax.control.estimators import DirectMeasurement, KalmanFilter, design_kalman
 from martths_jax.coupler import Coupler, build_coupler
 from martths_jax.errors import InputError
 from martths_jax.indices import indices
@@ -41,22 +45,31 @@ __all__ = [
     "ADFC",
     "LQG",
     "Benchmark",
+    "Compensator",
     "Controller",
     "Coupler",
     "Decision",
+    "DelayLine",
+    "DirectMeasurement",
+    "Entry",
+    "Estimator",
     "IdealPlants",
     "InputError",
+    "KalmanFilter",
     "Motion",
     "Observation",
+    "Parameter",
     "Passthrough",
     "Plants",
     "Quirks",
     "Result",
     "SensorNoise",
+    "Signal",
     "Status",
     "__version__",
     "build_benchmark",
     "build_coupler",
+    "design_kalman",
     "draw_plants",
     "indices",
     "load_motion",

@@ -240,7 +240,8 @@ def build_controller(given, config: StudyConfig, benchmark: Benchmark) -> Chosen
     try:
         guest = find(kind)
     except InputError as error:
-        raise InputError(f"Controller {given!r}: {error}" if kind != given else str(error)) from None
+        where = "" if kind == given else f"Controller {given!r}: "
+        raise InputError(f"{where}{error}") from None
     entry = guest.entry
     known = entry.defaults
     raise_all(unknown_names(sorted(set(table) - set(known)), set(known), f"Setting of {given}"))

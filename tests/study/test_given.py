@@ -95,7 +95,7 @@ def test_lists_keep_settings_together():
         (["adfc{e=[1}"], "lacks a closing ]|in quotes"),
         (["=adfc"], "cannot be read; write KIND, KIND{KEY=VALUE"),
         ({"a": 3}, "must map 'a' to a kind, to settings or to a Controller, but got 3"),
-        (["slow=pid"], "'slow' is unknown|kind"),
+        (["slow=pid"], "'slow': .*'pid' is unknown"),
         (["slow=adfcnb=64"], "cannot be read|unknown"),
         (["adfc{nbs=64}"], "'nbs' is unknown; did you mean 'nb'"),
         (["adfc{nb=many}"], "`nb` must be a whole number"),

@@ -177,8 +177,8 @@ def test_every_module_that_decides_a_number_is_listed():
     folder = sources.Path(sources.martths_jax.__file__).parent
     listed = {p.relative_to(folder) for name in ENGINE_MODULES for p in folder.glob(name)}
     # Inputs that are identified by what they hold, results, words and files.
-    other = ("motions", "campaign", "study", "sweep", "sensitivity", "_version", "errors", "files", "claims",
-             "checks", "published", "resources", "screen", "text")  # fmt: skip
+    other = ("motions", "campaign", "study", "sweep", "sensitivity", "_version", "errors", "files",
+             "claims", "checks", "published", "resources", "screen", "text")  # fmt: skip
     missing = []
     for name in done.stdout.split():
         path = sources.Path(*name.split(".")[1:])
