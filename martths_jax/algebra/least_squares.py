@@ -76,7 +76,9 @@ def weighted(rows: Rows, weight: jax.Array, towards=None) -> Rows:
     n = len(rows)
 
     def side(j, i, h):
-        return h + sum(weight[j, m] * towards[m][i] for m in range(n)) if towards else h
+        if towards is None:
+            return h
+        return h + sum(weight[j, m] * towards[m][i] for m in range(n))
 
     return tuple(
         tuple(g + weight[j, j + m] for m, g in enumerate(row[: n - j]))
