@@ -107,6 +107,7 @@ def solve_ldl(rows: Rows) -> tuple[list[list[jax.Array]], jax.Array]:
     return _substitute(work), tolerance
 
 
+@once
 def pivots(rows: Rows) -> list[jax.Array]:
     """d_1 ... d_n (T,) of G = L D L': what each regressor has beyond those before it."""
     n = len(rows)
