@@ -8,6 +8,7 @@ import numpy as np
 from job import Job
 
 from martths_jax import ADFC, SensorNoise, build_benchmark, draw_plants, indices
+from martths_jax.indices import trials_first
 from martths_jax.simulation import (
     LANES,
     Result,
@@ -43,6 +44,7 @@ def prepare(job: Job, seed: int = 1):
         tables = []
         for which, noise in blocks:
             sums, watch, _ = run_block(setup, plants, noise, which, devices, keep=False)
+            sums, watch = trials_first((sums, watch))
             result = Result(sums, watch, {}, reference, plants.trial[which], bench.fs, "", "adfc")
             tables.append(np.stack(list(indices(result).values())))
         return Table(np.concatenate(tables, axis=1))
