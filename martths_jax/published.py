@@ -43,3 +43,5 @@ TABLE4 = {
     "J10_27": (13.2, 2.4, 4.61),
 }
 EXPERIMENT, LQG, ADFC = range(3)
+#: Entry of a controller -> its column of ``TABLE4``.
+COLUMNS = {"lqg": LQG, "adfc": ADFC}

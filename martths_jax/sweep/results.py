@@ -94,8 +94,11 @@ def open_sweep(folder: str | Path) -> Sweep:
 def write_results(run: RunFolder, config: SweepConfig) -> Sweep:
     """``sweep.nc``, ``sweep.csv``, ``summary.md`` and the configuration of the study behind it."""
     done = Sweep(assemble(run, config), run.path)
-    axes = "".join(f" --axis {a.name}={','.join(map(repr, a.values))}" for a in config.axes)
-    remark = f"The study that `martths sweep --config FILE{axes}` repeats."
+    axes = " ".join(f"{a.name}={','.join(map(repr, a.values))}" for a in config.axes)
+    remark = (
+        "The study that a sweep repeats: `martths sweep --config FILE --axis NAME=VALUES ...`\n"
+        f"with these axes: {axes}"
+    )
     write_files(run, "sweep", done.dataset, write_csv, done.summary(config.shown), remark)
     return done
 
