@@ -9,6 +9,7 @@ sessions or on how many devices it was computed: that is in ``provenance.json``.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import h5netcdf
@@ -17,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from martths_jax.campaign.checksum import CHECKSUM, content_digest
-from martths_jax.campaign.engine import FIRSTS
+from martths_jax.campaign.engine import FIRSTS, Outcome
 from martths_jax.campaign.files import writing
 from martths_jax.campaign.store import FORMAT, RunFolder
 from martths_jax.errors import InputError
@@ -45,6 +46,33 @@ _FIRST_WORDS = {
 }
 
 
+def outcome_variables(
+    dims: Sequence[str], gather: Callable[[Callable[[Outcome], np.ndarray]], np.ndarray]
+) -> dict:
+    """Variables that the results of every campaign have: what became of each run.
+
+    Args:
+        dims: of a run: dimensions of the cells, then of their rows.
+        gather: puts an array of each cell's ``Outcome``, (rows, ...), together over all cells.
+    """
+    cell = tuple(dims)
+    variables = {
+        "value": ((*cell, "index"), gather(lambda o: o.value), {
+            "long_name": "evaluation indices; NaN where there is none, see status"} | INDEX_UNITS),
+        "status": (cell, gather(lambda o: o.status), {
+            "long_name": "how the trial ended"} | STATUS_FLAGS),
+        "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
+            "long_name": "largest valve command", "units": "V"}),
+        "held": (cell, gather(lambda o: o.held), {
+            "long_name": "fits that the controller did not use", "units": "1"}),
+    }  # fmt: skip
+    for i, name in enumerate(FIRSTS):
+        variables[f"first_{name}"] = ((*cell, "actuator"), gather(lambda o, i=i: o.first[:, i]), {
+            "long_name": f"first sample with {_FIRST_WORDS[name]}; NaN = never",
+            "units": "samples"})  # fmt: skip
+    return variables
+
+
 def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
     """All results of a complete run.
 
@@ -64,15 +92,7 @@ def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
 
     cell = ("controller", "motion", "trial")
     unit = ["ms" if name.startswith(("J1_", "J4_")) else "percent" for name in NAMES]
-    variables = {
-        "value": ((*cell, "index"), gather(lambda o: o.value), {
-            "long_name": "evaluation indices; NaN where there is none, see status"} | INDEX_UNITS),
-        "status": (cell, gather(lambda o: o.status), {
-            "long_name": "how the trial ended"} | STATUS_FLAGS),
-        "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
-            "long_name": "largest valve command", "units": "V"}),
-        "held": (cell, gather(lambda o: o.held), {
-            "long_name": "fits that the controller did not use", "units": "1"}),
+    variables = outcome_variables(cell, gather) | {
         "draw": (("trial", "parameter"), np.asarray(plants.draws), {
             "long_name": "standard normal draws of the plant", "units": "1"}),
         "plant_hz": (("trial", "parameter"), np.asarray(plants.parameters_hz), {
@@ -80,10 +100,6 @@ def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
             "units": "Hz"}),
         "unit": (("index",), np.array(unit), {"long_name": "unit of each index"}),
     }  # fmt: skip
-    for i, name in enumerate(FIRSTS):
-        variables[f"first_{name}"] = ((*cell, "actuator"), gather(lambda o, i=i: o.first[:, i]), {
-            "long_name": f"first sample with {_FIRST_WORDS[name]}; NaN = never",
-            "units": "samples"})  # fmt: skip
     variables |= _motion_variables(identity)
     coordinates = {
         "controller": np.array(controllers),

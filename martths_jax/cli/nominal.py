@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+from itertools import product
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 import typer
@@ -27,6 +27,7 @@ from martths_jax.cli.motion_options import (
     Variable,
     load_all,
 )
+from martths_jax.cli.options import Trial, option, required, setting
 from martths_jax.control.controllers import Controller
 from martths_jax.errors import argument_error
 from martths_jax.files import atomic, safe_name
@@ -45,8 +46,7 @@ from martths_jax.study import make_config
 REAL = ("elcentro", "kobe", "morganhill")
 BUILT_IN = ("elcentro-like", "kobe-like", "morganhill-like")
 
-Fs = Annotated[float, typer.Option("--fs", help="Sampling rate [Hz].")]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of the plant and noise draws.")]
+Seed = setting("seed")
 
 
 def build_controller(given: str, benchmark: Benchmark) -> tuple[Controller, dict]:
@@ -81,23 +81,13 @@ def _like(value: float, printed: float) -> str:
 
 
 def run(
-    motion: Motions,
-    out: Annotated[Path, typer.Option("--out", help="Folder for signals.npz and indices.")],
-    controller: Annotated[
-        str,
-        typer.Option(
-            "--controller",
-            metavar="[NAME=]KIND[{KEY=VALUE,...}]",
-            help="lqg, adfc or passthrough, also with settings: 'adfc{nb=2048,no=2047}'.",
-        ),
-    ] = "adfc",
-    trial: Annotated[
-        int,
-        typer.Option("--trial", min=0, help="0 is the nominal plant, 1, 2, ... uncertain ones."),
-    ] = 0,
+    motion: required("motions"),
+    out: required("out", "a folder"),
+    controller: setting("controllers", "adfc") = None,
+    trial: Trial = 0,
     seed: Seed = 0,
-    fs: Fs = 1024,
-    integrator: Annotated[str, typer.Option(help="newmark, rk4 or zoh.")] = "newmark",
+    fs: setting("fs") = 1024.0,
+    integrator: setting("integrator") = "newmark",
     records: Records = None,
     scale: Scale = None,
     pga: Pga = None,
@@ -105,10 +95,8 @@ def run(
     units: Units = None,
     dt: Dt = None,
     variable: Variable = None,
-    resample: Resample = "linear",
-    mat: Annotated[
-        bool, typer.Option("--mat", help="Write all of it as a MATLAB file NAME.mat too.")
-    ] = False,
+    resample: Resample = None,
+    matlab: option(bool, "--matlab", help="Write all of it as a MATLAB file NAME.mat too") = False,
 ) -> None:
     """Run one trial and save its signals and indices.
 
@@ -119,14 +107,15 @@ def run(
     """
     motions = load_all(motion, records, scale, pga, sa, units, resample, fs, dt, variable)
     benchmark = build_benchmark(fs, integrator)
-    drive, chosen = build_controller(controller, benchmark)
     plants = nominal_plant() if trial == 0 else draw_plants(1, seed, first=trial)
-    about = {"trial": trial, "seed": seed, "integrator": integrator, "settings": chosen}
+    drives = [build_controller(given, benchmark) for given in controller or ["adfc"]]
     lost = []
-    with progress(f"{drive.name}, trial {trial}", len(motions)) as tell:
-        for done, one in enumerate(motions, 1):
+    names = ", ".join(drive.name for drive, _ in drives)
+    with progress(f"{names}, trial {trial}", len(motions) * len(drives)) as tell:
+        for done, (one, (drive, chosen)) in enumerate(product(motions, drives), 1):
+            about = {"trial": trial, "seed": seed, "integrator": integrator, "settings": chosen}
             result = simulate(benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True)
-            _save_run(out, one, drive.name, result, about, mat)
+            _save_run(out, one, drive.name, result, about, matlab)
             console.print(str(result), highlight=False)
             _print_indices(result)
             if result.lost[0]:
@@ -186,12 +175,8 @@ def _print_indices(result) -> None:
 
 def table4(
     records: Records = None,
-    motion: Annotated[
-        list[str] | None, typer.Option("--motion", help="Motions instead of the paper's three.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for table4.md and table4.csv.")
-    ] = None,
+    motion: Motions = None,
+    out: setting("out", "the screen only; else a folder") = None,
     seed: Seed = 0,
     scale: Scale = None,
     units: Units = None,
