@@ -63,7 +63,7 @@ class ADFC(Controller):
 
     Scalars may be given as arrays over trials (T,), `start` and `anchor` as (8, 2, T).  A fit whose
     normal matrix is singular or worse conditioned than 1e14 leaves the last good coefficients in
-    place; ``Result.watch.held`` counts these.
+    place; ``Result.counts["held"]`` is their number.
     """
 
     nb: int = field(default=1024, metadata={"static": True})
@@ -80,8 +80,10 @@ class ADFC(Controller):
     adapts = True
     signals = (
         Signal("C_A", ("coefficient", "actuator"), "1",
-               "adaptive coefficients in scaled derivatives"),
-        Signal("held", (), "1", "fits that were not used so far"),
+               "adaptive coefficients in scaled derivatives", elements=tuple(
+                   f"u{actuator}: x{stroke}" + "'" * order
+                   for stroke in (1, 2) for order in range(4) for actuator in (1, 2))),
+        Signal("held", (), "1", "fits that the controller did not use", count=True),
     )  # fmt: skip
     shared_axes = MappingProxyType({"no": 0, "pull": 0, "q": 0, "start": 2, "anchor": 2})
 
