@@ -29,8 +29,7 @@ class Row(NamedTuple):
     row: int
 
 
-@dataclass(frozen=True)
-class Pair:
+class Pair(NamedTuple):
     """What an index compares.
 
     Attributes:
@@ -107,7 +106,7 @@ class Kind(Observer):
         ends = [
             i + 1
             for i, (one, other) in enumerate(pairwise(self.pairs))
-            if other != Pair(*(Row(r.signal, r.row + 1) for r in (one.value, one.target)))
+            if other != Pair(*(Row(r.signal, r.row + 1) for r in one))
         ]
         found = []
         for first, last in pairwise([0, *ends, len(self.pairs)]):

@@ -64,6 +64,22 @@ def choose(given: Iterable[str | Index] | str | Index = DEFAULT) -> tuple[Index,
     return tuple(found.values())
 
 
+def shown_of(
+    asked: Iterable[str], usual: tuple[str, ...], indices: Iterable[Index]
+) -> tuple[str, ...]:
+    """Names of the indices that figures and summaries show.
+
+    Args:
+        asked: by the user, or `usual` where nothing was asked for.
+        usual: what is shown of a run that has it all; else its first indices.
+        indices: of the run.
+    """
+    asked, names = tuple(dict.fromkeys(asked)), [index.name for index in indices]
+    if asked != usual:
+        return asked
+    return tuple(n for n in usual if n in names) or tuple(names[: len(usual)])
+
+
 def _meant(one) -> Iterator[Index]:
     if isinstance(one, Index):
         return iter((one,))

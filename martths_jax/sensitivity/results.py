@@ -12,13 +12,14 @@ from martths_jax.campaign.dataset import (
     INDEX_UNITS,
     STATUS_FLAGS,
     attributes,
+    index_names,
+    index_variables,
     read_results,
     save_dataset,
 )
 from martths_jax.campaign.files import write_text, writing
 from martths_jax.campaign.plan import Plan
 from martths_jax.campaign.store import RunFolder
-from martths_jax.indices import NAMES
 from martths_jax.sensitivity.design import Design
 from martths_jax.sensitivity.estimators import LEVEL, RESAMPLES, SobolIndices, sobol, verdicts
 from martths_jax.sensitivity.store import ROWS
@@ -116,7 +117,8 @@ def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
     value = np.stack([o.value.reshape(*shape, -1) for o in outcomes])
     status = np.stack([o.status.reshape(shape) for o in outcomes])
     found = [sobol(v, seed=plan.config.seed) for v in value]
-    notes = [list(verdicts(NAMES, f, design.samples).values()) for f in found]
+    identity = run.header["identity"]
+    notes = [list(verdicts(identity["indices"], f, design.samples).values()) for f in found]
     cell = ("controller", "index", "factor")
     variables = {
         name: (cell, np.stack([getattr(f, name) for f in found]), {
@@ -136,10 +138,10 @@ def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
             "long_name": "how the run ended"} | STATUS_FLAGS),
         "point": (("sample", "row", "factor"), design.unit, {
             "long_name": "points of the design in the unit cube", "units": "1"}),
-    }  # fmt: skip
+    } | index_variables(identity)  # fmt: skip
     coordinates = {
         "controller": np.array(names),
-        "index": np.array(NAMES),
+        "index": np.array(identity["indices"]),
         "factor": np.array(design.factors),
         "row": np.array(["A", "B", *(f"AB {f}" for f in design.factors)]),
         "sample": np.arange(design.samples, dtype=np.int32),
@@ -189,7 +191,7 @@ def summarise(found: Sensitivity) -> Summary:
         ):
             rows = [
                 (name, *(_cell(*x) for x in zip(value[i], low[i], high[i], strict=True)))
-                for i, name in enumerate(NAMES)
+                for i, name in enumerate(index_names(found.dataset))
             ]
             note = (
                 f"In brackets: {LEVEL:.0%} bootstrap confidence intervals, {one.used} of "
@@ -214,7 +216,7 @@ def leading(found: Sensitivity, controller: str, most: int = 3) -> Table:
     """For each index the factors with the largest total indices: a table for the screen."""
     one, rows = indices_of(found, controller), []
     factors = found.dataset.factor.values
-    for i, name in enumerate(NAMES):
+    for i, name in enumerate(index_names(found.dataset)):
         note = found.notes.get((controller, name), "")
         order = np.argsort(-one.total[i])[:most] if one.varies[i] else []
         cells = [

@@ -14,6 +14,9 @@ from martths_jax.campaign.dataset import (
     INDEX_UNITS,
     STATUS_FLAGS,
     attributes,
+    count_variables,
+    index_names,
+    index_variables,
     read_results,
     save_dataset,
 )
@@ -21,7 +24,6 @@ from martths_jax.campaign.engine import FIRSTS
 from martths_jax.campaign.files import write_text, writing
 from martths_jax.campaign.statistics import percentile
 from martths_jax.campaign.store import RunFolder
-from martths_jax.indices import NAMES
 from martths_jax.plant import PARAMETERS
 from martths_jax.study.summary import Summary, Table, extent, number
 from martths_jax.sweep.axes import Axis, Scalar
@@ -139,11 +141,11 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
             "long_name": "evaluation indices; NaN where the trial diverged"} | INDEX_UNITS),
         "status": (cell, gather(lambda o: o.status), {
             "long_name": "how the trial ended"} | STATUS_FLAGS),
-        "held": (cell, gather(lambda o: o.held), {
-            "long_name": "fits that the controller did not use", "units": "1"}),
         "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
             "long_name": "largest valve command", "units": "V"}),
     }  # fmt: skip
+    identity = run.header["identity"]
+    variables |= index_variables(identity) | count_variables(identity, cell, gather)
     variables["draw"] = (("trial", "parameter"), run.draws().plants(
         np.arange(run.trials + 1)).draws, {
             "long_name": "standard normal draws of the plant, before any spread", "units": "1"},
@@ -164,37 +166,41 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         "controller": np.array(list(grid.jobs)),
         "motion": np.array(motions),
         "trial": np.arange(run.trials + 1, dtype=np.int32),
-        "index": np.array(NAMES),
+        "index": np.array(run.header["identity"]["indices"]),
         "actuator": np.array([1, 2], dtype=np.int32),
         "parameter": np.array(PARAMETERS),
     }  # fmt: skip
     about = attributes(run) | {
         "title": "Virtual multi-axial real-time hybrid simulation: sweep",
         "axes": json.dumps(run.header["identity"]["axes"]),
+        "counts": json.dumps(list(identity["counts"])),
     }
     return xr.Dataset(variables, coordinates, about)
 
 
 def write_csv(sweep: Sweep, path: Path) -> None:
-    """One row a cell, controller, motion and trial: axes, status, fits not used, indices.
+    """One row a cell, controller, motion and trial: axes, status, counts, indices.
 
     Numbers have all their digits; an index of a trial that diverged is empty.
     """
     data, axes = sweep.dataset, sweep.axes
     words = {int(s): s.name.lower() for s in Status}
-    heads = [*(a.name for a in axes), "controller", "motion", "trial", "status", "held", *NAMES]
+    counts = list(json.loads(data.attrs["counts"]))
+    heads = [*(a.name for a in axes), "controller", "motion", "trial", "status", *counts,
+             *index_names(data)]  # fmt: skip
     with writing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(heads) + "\n")
         for place in np.ndindex(*data.value.shape[:-2]):
             values = [repr(a.values[i]) for a, i in zip(axes, place, strict=False)]
             names = [str(data.controller.values[place[-2]]), str(data.motion.values[place[-1]])]
             start = ",".join([*values, *map(csv_field, names)])
-            for trial, status, held, row in zip(
-                data.trial.values, data.status.values[place], data.held.values[place],
+            numbers = [data[name].values[place].tolist() for name in counts]
+            for trial, status, *counted, row in zip(
+                data.trial.values, data.status.values[place], *numbers,
                 data.value.values[place].tolist(), strict=True,
             ):  # fmt: skip
-                cells = ",".join("" if x != x else repr(x) for x in row)
-                file.write(f"{start},{trial},{words[int(status)]},{held},{cells}\n")
+                cells = ["" if x != x else repr(x) for x in (*counted, *row)]
+                file.write(",".join([f"{start},{trial},{words[int(status)]}", *cells]) + "\n")
 
 
 def summarise(sweep: Sweep, shown: tuple[str, ...]) -> Summary:

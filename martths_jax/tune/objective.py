@@ -52,7 +52,7 @@ class Objective:
         terms = []
         for part in text.split("+"):
             match = re.fullmatch(r"\s*(?:([^*\s]+)\s*\*)?\s*([A-Za-z0-9_]+)\s*", part)
-            named = match and match[2]
+            named = match and match[2].upper()
             word = (named or "").casefold()
             group = [
                 i.name for i in KNOWN.values() if word in (i.name.casefold(), i.group.casefold())
@@ -65,11 +65,7 @@ class Objective:
                     f"The groups are {', '.join(dict.fromkeys(i.group for i in KNOWN.values()))}; "
                     f"the indices {', '.join(KNOWN)}.",
                 )
-            weight = _positive(
-                "objective",
-                match[1] or "1",
-                f"have a positive weight on {group[0].split('_')[0] if len(group) > 1 else group[0]}",
-            )
+            weight = _positive("objective", match[1] or "1", f"have a positive weight on {named}")
             terms += [(weight / len(group), name) for name in group]
         limit = _positive("volts", volt_limit, "be a positive limit (V)")
         weight = float(penalty)

@@ -11,7 +11,7 @@ import numpy as np
 from martths_jax.benchmark import Benchmark
 from martths_jax.campaign.files import write_text
 from martths_jax.files import atomic
-from martths_jax.indices import NAMES, indices
+from martths_jax.indices import indices
 from martths_jax.motions import Motion
 from martths_jax.plant import draw_plants
 from martths_jax.published import ADFC, LQG, TABLE4
@@ -59,7 +59,7 @@ def compare(benchmark, controller, state, check: Motion, plants: int) -> list[di
         found = indices(result)
         kept = ~result.lost
         medians[name] = {
-            n: float(np.median(found[n][kept])) if kept.any() else np.nan for n in NAMES
+            n: float(np.median(found[n][kept])) if kept.any() else np.nan for n in found
         }
         medians[name]["diverged [%]"] = 100 * float(np.mean(result.lost))
         medians[name]["largest volts"] = float(np.max(result.watch.volt_peak))
