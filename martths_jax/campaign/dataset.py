@@ -28,7 +28,7 @@ from martths_jax.watch import Status
 ACTUATORS = np.array([1, 2], dtype=np.int32)
 INDEX_UNITS = {"units": "see the variable `unit`; delays: positive = late"}
 #: Units as files spell them.
-SPELT = {"%": "percent"}
+SPELT = {"%": "percent", "mm²": "mm2"}
 #: What the numbers of a status mean, by the conventions of NetCDF.
 STATUS_FLAGS = {
     "flag_values": np.array([int(s) for s in Status], dtype=np.int32),

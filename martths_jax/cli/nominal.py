@@ -27,10 +27,13 @@ from martths_jax.cli.motion_options import (
     Variable,
     load_all,
 )
+from martths_jax.cli.run_options import Indices, words
 from martths_jax.control.controllers import Controller
 from martths_jax.errors import argument_error
 from martths_jax.files import atomic, safe_name
-from martths_jax.indices import indices
+from martths_jax.indices import DEFAULT, choose
+from martths_jax.indices import indices as evaluate
+from martths_jax.indices.table import units_in_words
 from martths_jax.motions import available_motions
 from martths_jax.nominal import Comparison, compare_with_table4
 from martths_jax.plant import draw_plants, nominal_plant
@@ -106,6 +109,7 @@ def run(
     dt: Dt = None,
     variable: Variable = None,
     resample: Resample = "linear",
+    indices: Indices = None,
     mat: Annotated[
         bool, typer.Option("--mat", help="Write all of it as a MATLAB file NAME.mat too.")
     ] = False,
@@ -122,10 +126,13 @@ def run(
     drive, chosen = build_controller(controller, benchmark)
     plants = nominal_plant() if trial == 0 else draw_plants(1, seed, first=trial)
     about = {"trial": trial, "seed": seed, "integrator": integrator, "settings": chosen}
+    evaluated = choose(words(indices) or DEFAULT)
     lost = []
     with progress(f"{drive.name}, trial {trial}", len(motions)) as tell:
         for done, one in enumerate(motions, 1):
-            result = simulate(benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True)
+            result = simulate(
+                benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True, indices=evaluated
+            )
             _save_run(out, one, drive.name, result, about, mat)
             console.print(str(result), highlight=False)
             _print_indices(result)
@@ -147,7 +154,7 @@ def _save_run(out: Path, motion, name: str, result, settings: dict, mat: bool) -
         "ref": result.reference,
         **{key: np.asarray(value)[0] for key, value in result.signals.items()},
     }
-    values = {key: float(v[0]) for key, v in indices(result).items()}
+    values = {key: float(v[0]) for key, v in evaluate(result).items()}
     about = settings | {
         "motion": motion.name,
         "source": motion.source,
@@ -177,10 +184,11 @@ def _for_matlab(value):
 
 
 def _print_indices(result) -> None:
-    rows = [(name, f"{value[0]:.3f}") for name, value in indices(result).items()]
+    rows = [(name, f"{value[0]:.3f}") for name, value in evaluate(result).items()]
     # Four indices a line.
     lines = [tuple(c for row in rows[i : i + 4] for c in row) for i in range(0, len(rows), 4)]
-    title = f"{result.controller}, {result.motion}: J1, J4 in ms, the others in %"
+    told = units_in_words(result.sums.indices)
+    title = f"{result.controller}, {result.motion}: {told}"
     console.print(ScreenTable(title, ("index", "value") * 4, lines, keys=0, text=("index",)))
 
 
@@ -197,6 +205,7 @@ def table4(
     units: Units = None,
     dt: Dt = None,
     variable: Variable = None,
+    indices: Indices = None,
 ) -> None:
     """The 48 numbers of Table 4 (24 indices, LQG and ADFC, nominal plant) beside those in print.
 
@@ -209,7 +218,10 @@ def table4(
     motions = load_all(names, records, scale, units=units, dt=dt, variable=variable)
     benchmark = build_benchmark()
     with progress("Table 4", 2 * len(motions)) as tell:
-        found = compare_with_table4(benchmark, motions, noise=SensorNoise(seed=seed), progress=tell)
+        found = compare_with_table4(
+            benchmark, motions, noise=SensorNoise(seed=seed), progress=tell,
+            indices=words(indices) or DEFAULT,
+        )  # fmt: skip
     _print_comparison(found)
     if out:
         for name, text in (("table4.md", found.to_markdown()), ("table4.csv", found.to_csv())):

@@ -10,6 +10,7 @@ import typer
 
 from martths_jax.campaign.given import split_list
 from martths_jax.cli.console import error_console
+from martths_jax.indices import GROUPS
 from martths_jax.study import Bars, Lines, Reporter
 
 Config = Annotated[
@@ -23,6 +24,15 @@ Controllers = Annotated[
         metavar="[NAME=]KIND[{KEY=VALUE,...}]",
         help="Controllers, separated by commas or repeated, such as lqg or "
         "'slow=adfc{nb=2048,no=2047}'; adfc if left out.",
+    ),
+]
+Indices = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--indices",
+        metavar="NAMES",
+        help=f"What is evaluated, separated by commas or repeated: {', '.join(GROUPS)}, names such "
+        "as J2_1 or TI, package.module:NAME of your own; benchmark if left out.",
     ),
 ]
 MotionList = Annotated[str | None, typer.Option("--motions", help="Motions separated by commas.")]
@@ -50,7 +60,8 @@ def words(texts: list[str] | None) -> list[str] | None:
 def given_settings(motions: list[str] | None, motion_list: str | None, **settings) -> dict:
     """A study's settings that were given on the command line."""
     asked = [*(motions or []), *(words([motion_list]) or [] if motion_list else [])]
-    settings |= {"motions": asked or None, "controllers": words(settings.get("controllers"))}
+    lists = {name: words(settings.get(name)) for name in ("controllers", "indices")}
+    settings |= {"motions": asked or None} | lists
     return {name: value for name, value in settings.items() if value is not None}
 
 

@@ -28,6 +28,7 @@ from martths_jax.cli.run_options import (
     Controllers,
     Devices,
     Figures,
+    Indices,
     Memory,
     MotionList,
     Quiet,
@@ -64,6 +65,7 @@ def sensitivity(
     dt: Dt = None,
     variable: Variable = None,
     resample: Resample = None,
+    indices: Indices = None,
     index: Annotated[
         list[str] | None,
         typer.Option(
@@ -84,7 +86,8 @@ def sensitivity(
 ) -> None:
     """What drives each index: Sobol' indices of plant parameters, noise and motion."""
     given = given_settings(
-        motions, motion_list, trials=trials, seed=seed, controllers=controllers, records=records,
+        motions, motion_list, trials=trials, seed=seed, controllers=controllers, indices=indices,
+        records=records,
         scale=scale, pga=pga, sa=sa, units=units, dt=dt, variable=variable, resample=resample,
         out=out, devices=devices, memory_gb=memory_gb,
     )  # fmt: skip

@@ -29,6 +29,7 @@ from martths_jax.cli.motion_options import (
 from martths_jax.cli.run_options import (
     AllowMixed,
     Devices,
+    Indices,
     Quiet,
     reporter_for,
     say_what_is_kept,
@@ -61,6 +62,7 @@ def study(
             "commas [lqg, adfc].",
         ),
     ] = None,
+    indices: Indices = None,
     motions: Motions = None,
     records: Records = None,
     scale: Scale = None,
@@ -123,10 +125,10 @@ def study(
 ) -> None:
     """Run controllers x motions x uncertain plants; resumes and extends what is in the folder."""
     given = {
-        "trials": trials, "seed": seed, "controllers": words(controllers), "motions":
-        motions or None, "records": records, "scale": scale, "pga": pga, "sa": sa, "units": units,
-        "dt": dt, "variable": variable, "resample": resample, "draws": draws, "plants": plants,
-        "plants_as": plants_as,
+        "trials": trials, "seed": seed, "controllers": words(controllers),
+        "indices": words(indices), "motions": motions or None, "records": records,
+        "scale": scale, "pga": pga, "sa": sa, "units": units, "dt": dt, "variable": variable,
+        "resample": resample, "draws": draws, "plants": plants, "plants_as": plants_as,
         "out": out, "keep": trial_list(keep), "signals": signals, "devices": devices,
         "memory_gb": memory_gb, "max_failed": max_failed,
     }  # fmt: skip

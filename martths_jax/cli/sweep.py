@@ -28,6 +28,7 @@ from martths_jax.cli.run_options import (
     Controllers,
     Devices,
     Figures,
+    Indices,
     Memory,
     MotionList,
     Quiet,
@@ -84,6 +85,7 @@ def sweep(
     dt: Dt = None,
     variable: Variable = None,
     resample: Resample = None,
+    indices: Indices = None,
     index: Annotated[
         list[str] | None,
         typer.Option(
@@ -107,7 +109,8 @@ def sweep(
     axes = [(k, v) for k, v in flags.items() if v is not None]
     axes += [split_axis(text) for text in axis or ()]
     given = given_settings(
-        motions, motion_list, trials=trials, seed=seed, controllers=controllers, records=records,
+        motions, motion_list, trials=trials, seed=seed, controllers=controllers, indices=indices,
+        records=records,
         scale=scale, pga=pga, sa=sa, units=units, dt=dt, variable=variable, resample=resample,
         out=out, devices=devices, memory_gb=memory_gb,
     )  # fmt: skip

@@ -13,8 +13,8 @@ as long as the record: they can be summed while the run goes, whatever its lengt
 value of the record's continuous spectrum (its DTFT) there, exactly, since a transform of P samples
 of the record folded to that length, x(k) + x(k + P) + ..., has the record's spectrum at the P
 frequencies j fs/P: all that a sample costs is one addition.  A rig that is linear and at rest in
-the beginning and in the end has Y/X = H(f_j) on any such grid.  Outside of ``BAND`` the strokes of the benchmark
-have less than 0.1 % of their energy.
+the beginning and in the end has Y/X = H(f_j) on any such grid.  Outside of ``BAND`` the strokes
+of the benchmark have less than 0.1 % of their energy.
 """
 
 from __future__ import annotations

@@ -64,6 +64,16 @@ def choose(given: Iterable[str | Index] | str | Index = DEFAULT) -> tuple[Index,
     return tuple(found.values())
 
 
+def units_in_words(indices: Iterable[Index]) -> str:
+    """Which units the values of some indices have, as in "J1, J4 in ms, the others in %"."""
+    groups: dict[str, list[str]] = {}
+    for index in indices:
+        groups.setdefault(index.unit, []).append(index.group)
+    usual = max(groups, key=lambda unit: len(groups[unit]))
+    rare = [f"{', '.join(dict.fromkeys(g))} in {u}" for u, g in groups.items() if u != usual]
+    return ", ".join([*rare, f"{'the others' if rare else 'all'} in {usual}"])
+
+
 def shown_of(
     asked: Iterable[str], usual: tuple[str, ...], indices: Iterable[Index]
 ) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ class TrackingIndicator(Kind):
 
 INDICES = tuple(
     Index(
-        f"{name}_{place}", "mm^2", TrackingIndicator(), Pair.of("x_m", "x_a", row),
+        f"{name}_{place}", "mm²", TrackingIndicator(), Pair.of("x_m", "x_a", row),
         f"tracking indicator of actuator {place}, {words}",
         "Mercan and Ricles 2007, Earthquake Engineering & Structural Dynamics 36(11)", of,
     )
