@@ -22,7 +22,7 @@ from martths_jax.files import atomic
 from martths_jax.text import csv_cell
 
 MM = 1 / 25.4  # inch per mm
-_NAME = re.compile(r"([A-Z]+|[A-Za-z]+?)(\d*)([a-z]*)_(\w+)")
+_NAME = re.compile(r"([A-Z]+|[A-Za-z]+)(\d*)([a-z]*)_(\w+)")
 #: Widths of one and of two journal columns [mm].
 SINGLE, DOUBLE = 85.0, 174.0
 BLUE, VERMILLION, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"

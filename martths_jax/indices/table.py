@@ -13,7 +13,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from martths_jax.errors import InputError
 from martths_jax.indices import benchmark, frequency, tracking, true_stroke
@@ -74,17 +74,15 @@ def units_in_words(indices: Iterable[Index]) -> str:
     return ", ".join([*rare, f"{'the others' if rare else 'all'} in {usual}"])
 
 
-def shown_of(
-    asked: Iterable[str], usual: tuple[str, ...], indices: Iterable[Index]
-) -> tuple[str, ...]:
+def shown_of(asked: Iterable[str], usual: tuple[str, ...], names: Sequence[str]) -> tuple[str, ...]:
     """Names of the indices that figures and summaries show.
 
     Args:
         asked: by the user, or `usual` where nothing was asked for.
         usual: what is shown of a run that has it all; else its first indices.
-        indices: of the run.
+        names: of the run's indices.
     """
-    asked, names = tuple(dict.fromkeys(asked)), [index.name for index in indices]
+    asked = tuple(dict.fromkeys(asked))
     if asked != usual:
         return asked
     return tuple(n for n in usual if n in names) or tuple(names[: len(usual)])

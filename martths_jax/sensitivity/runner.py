@@ -100,9 +100,8 @@ def build(config, shown: Iterable[str], changes: dict) -> tuple[Plan, Design, tu
     if not isinstance(config, StudyConfig):
         config = DEFAULTS | dict(config or {})
     study = make_config(config, **changes)
-    evaluated = choose(study.indices)
-    shown = shown_of(shown, SHOWN, evaluated)
-    names = {index.name for index in evaluated}
+    names = [index.name for index in choose(study.indices)]
+    shown = shown_of(shown, SHOWN, names)
     problems = unknown_names([n for n in shown if n not in names], names, "Index")
     if not is_power_of_two(study.trials):
         near = 2 ** max(1, round(np.log2(max(study.trials, 2))))

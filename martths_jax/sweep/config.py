@@ -73,10 +73,9 @@ def make_sweep(
     found, bad = make_axes(axes, _entries(study))
     problems += bad
     if study is not None:
-        evaluated = choose(study.indices)
-        shown = shown_of(shown, SHOWN, evaluated)
-        run = {index.name for index in evaluated}
-        problems += unknown_names([n for n in shown if n not in run], run, "Index")
+        names = [index.name for index in choose(study.indices)]
+        shown = shown_of(shown, SHOWN, names)
+        problems += unknown_names([n for n in shown if n not in names], names, "Index")
     grid = Grid(found, {})
     if study is not None:
         problems += _clashes(found, study)

@@ -24,6 +24,7 @@ from martths_jax.campaign.engine import FIRSTS
 from martths_jax.campaign.files import write_text, writing
 from martths_jax.campaign.statistics import percentile
 from martths_jax.campaign.store import RunFolder
+from martths_jax.indices.table import shown_of
 from martths_jax.plant import PARAMETERS
 from martths_jax.study.summary import Summary, Table, extent, number
 from martths_jax.sweep.axes import Axis, Scalar
@@ -87,7 +88,7 @@ class Sweep:
 
     def summary(self, shown: Iterable[str] = SHOWN) -> Summary:
         """Median and P95 of chosen indices and lost trials, cell by cell."""
-        return summarise(self, tuple(shown))
+        return summarise(self, shown_of(shown, SHOWN, index_names(self.dataset)))
 
     def __str__(self) -> str:
         sizes = " x ".join(f"{axis.name} {len(axis.values)}" for axis in self.axes)
