@@ -7,18 +7,18 @@ physics.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
-from martths_jax import watch as watching
 from martths_jax.benchmark import Benchmark
 from martths_jax.control.base import Controller
 from martths_jax.control.compensator import Compensator, CompensatorState
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
-from martths_jax.indices import IndexSums, blank_sums, correlate, pairs
+from martths_jax.observers import Observer
 from martths_jax.once import once
 from martths_jax.structure.modal import ModalSystem, advance, contract, output
 
@@ -83,7 +83,8 @@ def sample_period(
         state at k + 1, signals at k, the record that goes into the delay line.
     """
     # What the sensors and the filter know of the strokes at k.
-    measured = output(plant, state.plant) + noise
+    true = output(plant, state.plant)
+    measured = true + noise
     observed, estimate = compensator.observe(state.compensator, measured)
     known, felt = felt_strokes(benchmark, state.force_path, measured, estimate)
 
@@ -117,6 +118,7 @@ def sample_period(
         "num": numerical,
         "est": interface,
         "force": force,
+        "x": true,
     }
     return after, signals | decision.signals, decision.record
 
@@ -162,17 +164,16 @@ def run(
     noise: jax.Array,
     *,
     trials: int,
-    lags: tuple[int, int],
+    observers: Sequence[Observer],
     samples: jax.Array | None = None,
-    keep: int = 0,
     segment: int = 0,
-    tally: Any = None,
-) -> tuple[IndexSums, watching.Watch, dict[str, jax.Array], Any]:
+) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """Run a batch of trials over a whole motion.
 
     The scan over time is nested: windows of the controller's delay line outside, in them pieces
-    that are cross-correlated, in these samples.  The records that a window writes are what the next
-    one hands back, so the line costs neither a ring buffer nor its indices.
+    whose strokes stay in the cache until the observers have seen them, in these samples.  The
+    records that a window writes are what the next one hands back, so the line costs neither a ring
+    buffer nor its indices.
 
     Args:
         benchmark, controller: what stays; the controller is prepared.
@@ -181,18 +182,14 @@ def run(
         reference: (N, 6) response of the reference structure.
         noise: (N, 1 or 2, T or 1) sensor noise [mm].
         trials: number T of trials in the batch.
-        lags: (lead, lag) range of the cross-correlations [samples].
+        observers: what looks at the run, see ``Observer``.
         samples: length of the motion where `ground`, `reference` and `noise` are padded beyond it;
             a traced number, so that motions of any length share a program.  Not for reverse mode.
-        keep: return the signals of the first so many trials too.
         segment: for reverse mode: keep the state only once in so many samples (a divisor of the
             window) and go through the segment again for its derivative; 0 keeps every sample's.
-        tally: more running sums, an object with ``init(trials) -> sums`` and
-            ``add(sums, signals, reference, valid) -> sums``.
 
     Returns:
-        sums for the indices, watch for the status, signals (N, ..., T) (empty if `keep` is 0), what
-        the tally has summed (None without one).
+        the observers' states, finished; what they emitted, (N, ...), zeros beyond the motion.
     """
     rows = ground.shape[0]
     N = rows if samples is None else samples
@@ -201,30 +198,35 @@ def run(
     length = window_of(controller)
     part = segment or piece_length(length)
     windows = -(-rows // length)
+    pieces = tuple(dict.fromkeys(name for o in observers for name in o.pieces))
 
     def in_windows(x):
         padded = jnp.pad(x, [(0, windows * length - rows)] + [(0, 0)] * (x.ndim - 1))
         return padded.reshape(windows, length, *x.shape[1:])
 
     def sample(moving, inputs):
-        state, *booked = moving
+        state, seen = moving
         ground_k, reference_k, noise_k, delayed = inputs
         k = state.compensator.k
         state, signals, record = sample_period(
             benchmark, compensator, plant, state, ground_k, noise_k, delayed
         )
         valid = k < N
-        booked = _book(booked, signals, reference_k[:, None], k, valid, tally)
-        strokes = jnp.concatenate([signals[name] for name in ("x_a", "x_m", "x_hat")])
-        kept = {name: x[..., :keep] for name, x in signals.items()} if keep else {}
-        return (state, *booked), (jnp.where(valid, strokes, 0.0), record, kept)
+        seen = tuple(
+            observer.add(one, signals, reference_k[:, None], k, valid)
+            for observer, one in zip(observers, seen, strict=True)
+        )
+        strokes = {name: jnp.where(valid, signals[name], 0.0) for name in pieces}
+        emitted = tuple(observer.emit(signals) for observer in observers)
+        return (state, seen), (strokes, record, emitted)
 
     def piece(carry, inputs):
-        moving, tail, correlation = carry
-        moving, (strokes, records, signals) = jax.lax.scan(sample, moving, inputs)
-        strokes = tuple(strokes[:, i] for i in range(6))
-        added, tail = _correlate_window(tail, strokes, lags)
-        return (moving, tail, jax.tree.map(jnp.add, correlation, added)), (records, signals)
+        (state, seen), (strokes, records, emitted) = jax.lax.scan(sample, carry, inputs)
+        seen = tuple(
+            observer.add_piece(one, {name: strokes[name] for name in observer.pieces})
+            for observer, one in zip(observers, seen, strict=True)
+        )
+        return (state, seen), (records, emitted)
 
     def window(carry, inputs):
         records, carry = carry
@@ -232,30 +234,21 @@ def run(
         cut = lambda x: x.reshape(length // part, part, *x.shape[1:])  # noqa: E731
         join = lambda x: x.reshape(length, *x.shape[2:])  # noqa: E731
         body = jax.checkpoint(piece, prevent_cse=False) if segment else piece
-        carry, outputs = jax.lax.scan(body, carry, jax.tree.map(cut, inputs))
-        records, signals = jax.tree.map(join, outputs)
-        (state, *rest), *correlations = carry
+        (state, seen), outputs = jax.lax.scan(body, carry, jax.tree.map(cut, inputs))
+        records, emitted = jax.tree.map(join, outputs)
         if line and line.renew:
             box = state.compensator
             box = replace(box, controller=line.renew(box.controller))
             state = replace(state, compensator=box)
-        return (records, ((state, *rest), *correlations)), signals
+        return (records, (state, seen)), emitted
 
     blank = line.blank if line else None
     records = jax.tree.map(lambda x: jnp.zeros((length, *x.shape), x.dtype), blank)
     state = initial_state(benchmark, compensator, plant, trials)
-    extra = None if tally is None else tally.init(trials)
-    carry = (
-        records,
-        (
-            (state, blank_sums(trials), watching.init(trials), extra),
-            (jnp.zeros((sum(lags), trials)),) * 6,
-            (jnp.zeros((sum(lags) + 1, trials)),) * 4,
-        ),
-    )
+    carry = (records, (state, tuple(observer.init(trials) for observer in observers)))
     inputs = (in_windows(ground), in_windows(reference), in_windows(noise))
     if samples is None:
-        carry, signals = jax.lax.scan(window, carry, inputs)
+        carry, emitted = jax.lax.scan(window, carry, inputs)
     else:
         inputs_at = lambda i: jax.tree.map(lambda x: x[i], inputs)  # noqa: E731
         # What lies beyond the motion's end is left as zeros.
@@ -263,25 +256,17 @@ def run(
         blank = jax.tree.map(lambda x: jnp.zeros((windows, *x.shape)), shapes)
 
         def one(i, so_far):
-            carry, signals = so_far
+            carry, emitted = so_far
             carry, new = window(carry, inputs_at(i))
             put = jax.lax.dynamic_update_index_in_dim
-            return carry, jax.tree.map(lambda x, row: put(x, row, i, 0), signals, new)
+            return carry, jax.tree.map(lambda x, row: put(x, row, i, 0), emitted, new)
 
-        carry, signals = jax.lax.fori_loop(0, -(-N // length), one, (carry, blank))
+        carry, emitted = jax.lax.fori_loop(0, -(-N // length), one, (carry, blank))
 
-    _, ((_, sums, watch, extra), tail, correlation) = carry
-    # The last `lead` samples still wait for targets that come after them: none do.
-    nothing = (jnp.zeros((lags[0], trials)),) * 6
-    correlation = jax.tree.map(jnp.add, correlation, _correlate_window(tail, nothing, lags)[0])
-    signals = jax.tree.map(lambda x: x.reshape(windows * length, *x.shape[2:])[:rows], signals)
-    index_sums = IndexSums(
-        *(jnp.concatenate(group) for group in zip(*sums, strict=True)),
-        correlation=jnp.stack(correlation, axis=1),
-        lags=lags,
-        fs=benchmark.fs,
-    )
-    return index_sums, watch, signals, extra
+    _, (_, seen) = carry
+    whole = lambda x: x.reshape(windows * length, *x.shape[2:])[:rows]  # noqa: E731
+    finished = (observer.finish(one) for observer, one in zip(observers, seen, strict=True))
+    return tuple(finished), jax.tree.map(whole, emitted)
 
 
 def window_of(controller: Controller) -> int:
@@ -294,49 +279,3 @@ def piece_length(window: int) -> int:
     """Largest divisor of a window up to ``PIECE``; the whole window where all are small."""
     longest = next(n for n in range(min(PIECE, window), 0, -1) if window % n == 0)
     return longest if longest >= PIECE // 8 else window
-
-
-def _book(booked, signals, reference, k, valid, tally):
-    """Add sample k to the running sums, the watch and the tally."""
-    sums, watch, extra = booked
-    if tally is not None:
-        extra = tally.add(extra, signals, reference, valid)
-    sums = _accumulate(sums, signals, reference, valid)
-    return sums, watching.update(watch, k, valid, signals), extra
-
-
-def _accumulate(sums, signals, reference, valid):
-    """Running sums of squares and peaks of the ten pairs, see ``IndexSums``."""
-
-    def one(so_far, value, target):
-        error = jnp.where(valid, value - target, 0.0)
-        target = jnp.where(valid, target, 0.0)
-        return (
-            so_far[0] + error * error,
-            so_far[1] + target * target,
-            jnp.maximum(so_far[2], jnp.abs(error)),
-            jnp.maximum(so_far[3], jnp.abs(target)),
-        )
-
-    return tuple(
-        one(so_far, *pair) for so_far, pair in zip(sums, pairs(signals, reference), strict=True)
-    )
-
-
-def _correlate_window(tail, strokes, lags):
-    """Cross-correlations that a window adds, and the tail that the next one needs.
-
-    Args:
-        tail: the last lead + lag samples of the windows before, like `strokes`.
-        strokes: both targets, measured and estimated strokes of this window, six arrays (n, T).
-        lags: (lead, lag).
-
-    Returns:
-        (lead + lag + 1, T) correlations in the order of ``DELAYS``; the new tail.
-    """
-    n = strokes[0].shape[0]
-    joined = [jnp.concatenate(pair) for pair in zip(tail, strokes, strict=True)]
-    added = tuple(
-        correlate(joined[i][lags[1] : lags[1] + n], joined[i % 2], lags) for i in range(2, 6)
-    )
-    return added, tuple(x[n:] for x in joined)

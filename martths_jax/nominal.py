@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,8 @@ from martths_jax import published
 from martths_jax.benchmark import Benchmark
 from martths_jax.control.base import Controller
 from martths_jax.control.registry import find
-from martths_jax.indices import NAMES, indices
+from martths_jax.indices import DEFAULT, Index, choose
+from martths_jax.indices import indices as evaluate
 from martths_jax.motions import Motion
 from martths_jax.plant import nominal_plant
 from martths_jax.sensors import SensorNoise
@@ -38,7 +39,7 @@ class Comparison:
         """One row an index and controller: ours, published, deviation [%] if there is one."""
         found = []
         for controller, values in self.ours.items():
-            for name in NAMES:
+            for name in values:
                 target = published.printed(name, controller)
                 value = values[name]
                 row = {"controller": controller, "index": name, "martths_jax": value,
@@ -59,7 +60,7 @@ class Comparison:
 
     def cells(self) -> dict[str, list[str]]:
         """Of each index, what its row shows: ours, published and deviation by controller."""
-        found: dict[str, list[str]] = {index: [] for index in NAMES}
+        found: dict[str, list[str]] = {n: [] for values in self.ours.values() for n in values}
         rows = {(r["controller"], r["index"]): r for r in self.rows()}
         for index, cells in found.items():
             for name in self.ours:
@@ -86,6 +87,7 @@ def compare_with_table4(
     controllers: Sequence[Controller] | None = None,
     noise: SensorNoise | None = None,
     progress: Callable[[int], None] = lambda done: None,
+    indices: Iterable[str | Index] | str | Index = DEFAULT,
 ) -> Comparison:
     """Run the nominal plant under each controller and motion and average over the motions.
 
@@ -95,19 +97,21 @@ def compare_with_table4(
         controllers: those of the table with their defaults if None.
         noise: sensor noise; the benchmark's if None.
         progress: told how many runs are done.
+        indices: what is compared, see ``martths_jax.indices.choose``; the benchmark's 24.
     """
     controllers = controllers or [find(n).entry.build(benchmark) for n in published.COMPARED]
+    chosen = choose(indices)
     each: dict[str, dict[str, dict[str, float]]] = {}
     done = 0
     for controller in controllers:
         for motion in motions:
-            result = simulate(benchmark, controller, nominal_plant(), motion, noise)
-            values = {name: float(v[0]) for name, v in indices(result).items()}
+            result = simulate(benchmark, controller, nominal_plant(), motion, noise, indices=chosen)
+            values = {name: float(v[0]) for name, v in evaluate(result).items()}
             each.setdefault(controller.name, {})[motion.name] = values
             done += 1
             progress(done)
     ours = {
-        name: {index: float(np.mean([v[index] for v in runs.values()])) for index in NAMES}
+        name: {i.name: float(np.mean([v[i.name] for v in runs.values()])) for i in chosen}
         for name, runs in each.items()
     }
     return Comparison(tuple(m.name for m in motions), ours, each)

@@ -23,10 +23,11 @@ class Result:
     inside of that function and known outside.
 
     Attributes:
-        sums: what ``indices`` turns into the 24 indices: ``error_square`` (T, 10) and so on, see
-            ``IndexSums``, whose trials stand first here.
+        sums: what ``indices`` turns into numbers, see ``IndexSums``, whose trials stand first here.
         watch: first samples of saturation, runaway and non-finite values: ``saturated`` (T, 2) and
             so on, see ``Watch``, likewise.
+        counts: (T,) what the controller counted, by the name of its signal: for ADFC ``held``, fits
+            that it did not use.
         signals: (T, N, ...) histories if asked for, else empty: ``x_a``, ``x_m``, ``x_hat``, ``u``
             (T, N, 2) [mm]; ``num`` (T, N, 6) numerical and ``est`` (T, N, 2) estimated motion
             [m, rad]; ``force`` (T, N, 3) [N, N m]; whatever the controller adds.
@@ -35,16 +36,19 @@ class Result:
         trial: (T,) trial numbers.
         fs: sampling rate [Hz].
         motion, controller: names.
+        labels: what is counted, in words, in the order of ``counts``.
     """
 
     sums: IndexSums
     watch: watching.Watch
+    counts: dict[str, Any]
     signals: dict[str, Any]
     reference: Any
     trial: Any
     fs: float = field(metadata={"static": True})
     motion: str = field(metadata={"static": True})
     controller: str = field(metadata={"static": True})
+    labels: tuple[str, ...] = field(default=(), metadata={"static": True})
 
     @property
     def status(self) -> np.ndarray:
@@ -60,7 +64,8 @@ class Result:
     def describe(self, position: int) -> str:
         """What happened in the trial at `position`: its status, which actuator, from when."""
         watch, sums = trials_last(on_host((self.watch, self.sums)))
-        line = watching.describe(watch, sums, range(len(self.trial))[position], self.fs)
+        counts = dict(zip(self.labels, on_host(list(self.counts.values())), strict=True))
+        line = watching.describe(watch, sums, range(len(self.trial))[position], self.fs, counts)
         return f"Trial {int(np.asarray(self.trial)[position])} {line}"
 
     def __str__(self) -> str:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from types import MappingProxyType
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,12 +14,13 @@ import numpy as np
 
 from martths_jax.benchmark import VOLT_LIMIT, command_volts
 from martths_jax.indices import IndexSums, library, without_value
-from martths_jax.text import counted
+from martths_jax.observers import Observer
 
 #: A command or stroke beyond this is a loop that has run away: the largest stroke in the study is
 #: about a tenth of it, and the coupler has no position for strokes 254 mm apart.
 RUNAWAY_MM = 100.0
 NEVER = float(2**53)
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class Status(IntEnum):
@@ -50,8 +54,6 @@ class Watch:
         stroke: (2, T) a measured stroke left its range or is not a number.
         nonfinite: (2, T) a measured stroke is not finite.
         volt_peak: (2, T) largest valve command while it was in range [V].
-        held: (T,) number of fits that the controller did not use, because their normal matrix was
-            singular or too badly conditioned; 0 for controllers that fit nothing.
     """
 
     saturated: jax.Array
@@ -59,39 +61,34 @@ class Watch:
     stroke: jax.Array
     nonfinite: jax.Array
     volt_peak: jax.Array
-    held: jax.Array
 
 
-def init(trials: int) -> Watch:
-    """Nothing has happened yet."""
-    never = jnp.full((2, trials), NEVER)
-    return Watch(never, never, never, never, jnp.zeros((2, trials)), jnp.zeros(trials))
+class Watcher(Observer):
+    """Keeps the ``Watch`` of a run; looks at ``u`` and ``x_m`` (2, T) [mm]."""
 
+    def init(self, trials):
+        """Nothing has happened yet."""
+        never = jnp.full((2, trials), NEVER)
+        return Watch(never, never, never, never, jnp.zeros((2, trials)))
 
-def update(watch: Watch, k: jax.Array, valid: jax.Array, signals: dict[str, jax.Array]) -> Watch:
-    """Look at sample k.
+    def add(self, state, signals, reference, k, valid):
+        watch = state
+        volts = jnp.abs(command_volts(signals["u"]))
+        in_range = jnp.abs(signals["u"]) <= RUNAWAY_MM
+        now = jnp.where(valid, k.astype(float), NEVER)
 
-    Args:
-        k: number of the sample.
-        valid: whether it belongs to the record.
-        signals: ``u`` and ``x_m`` (2, T) [mm], and ``held`` (T,) from controllers that count it.
-    """
-    volts = jnp.abs(command_volts(signals["u"]))
-    in_range = jnp.abs(signals["u"]) <= RUNAWAY_MM
-    now = jnp.where(valid, k.astype(float), NEVER)
+        def first(so_far, good):
+            return jnp.minimum(so_far, jnp.where(good, NEVER, now))
 
-    def first(so_far, good):
-        return jnp.minimum(so_far, jnp.where(good, NEVER, now))
-
-    return Watch(
-        saturated=first(watch.saturated, ~(volts > VOLT_LIMIT)),
-        # NaN compares false, so it counts as out of range.
-        command=first(watch.command, in_range),
-        stroke=first(watch.stroke, jnp.abs(signals["x_m"]) <= RUNAWAY_MM),
-        nonfinite=first(watch.nonfinite, jnp.isfinite(signals["x_m"])),
-        volt_peak=jnp.where(valid & in_range & (volts > watch.volt_peak), volts, watch.volt_peak),
-        held=jnp.where(valid, signals.get("held", watch.held), watch.held),
-    )
+        peak = valid & in_range & (volts > watch.volt_peak)
+        return Watch(
+            saturated=first(watch.saturated, ~(volts > VOLT_LIMIT)),
+            # NaN compares false, so it counts as out of range.
+            command=first(watch.command, in_range),
+            stroke=first(watch.stroke, jnp.abs(signals["x_m"]) <= RUNAWAY_MM),
+            nonfinite=first(watch.nonfinite, jnp.isfinite(signals["x_m"])),
+            volt_peak=jnp.where(peak, volts, watch.volt_peak),
+        )
 
 
 def status_of(watch: Watch, sums: IndexSums | None = None) -> jax.Array:
@@ -115,13 +112,16 @@ def status_of(watch: Watch, sums: IndexSums | None = None) -> jax.Array:
     return xp.where(at_once, Status.NONFINITE, status)
 
 
-def describe(watch: Watch, sums: IndexSums, trial: int, fs: float) -> str:
+def describe(
+    watch: Watch, sums: IndexSums, trial: int, fs: float, counts: Mapping[str, Any] = NOTHING
+) -> str:
     """One line about a trial: its status, and what happened first, where and when.
 
     Args:
         watch, sums: of a finished run, trials on the last axis.
         trial: position in the batch.
         fs: sampling rate [Hz].
+        counts: (T,) what the controller counted, by what it counted.
     """
     status = Status(int(np.asarray(status_of(watch, sums))[trial]))
     column = lambda name: np.asarray(getattr(watch, name))[..., trial]  # noqa: E731
@@ -138,8 +138,7 @@ def describe(watch: Watch, sums: IndexSums, trial: int, fs: float) -> str:
                 f"actuator {i + 1} beyond {VOLT_LIMIT:g} V from {_when(first, fs)}, "
                 f"peak {column('volt_peak')[i]:.3g} V"
             )
-    if column("held"):
-        parts.append(f"{counted(int(column('held')), 'fit')} not used")
+    parts += [f"{what}: {int(n[trial])}" for what, n in counts.items() if n[trial]]
     return f"{status.name.lower()}: {'; '.join(parts)}" if parts else status.name.lower()
 
 

@@ -17,7 +17,7 @@ if not os.environ.get("MARTHS_TEST_OPTIMISED"):
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {quick}".strip()
 
 import martths_jax  # before any test touches JAX: it switches float64 on
-from martths_jax import runtime, simulation
+from martths_jax import blocks, runtime
 
 SIBLING = Path(__file__).resolve().parents[2] / "shared" / "benchmark"
 
@@ -43,7 +43,7 @@ def benchmark():
 def optimised(monkeypatch):
     """Compile simulations as users do: for long motions, and for what depends on the compiler."""
     best = runtime.compiler_options() | {"xla_backend_optimization_level": 3}
-    monkeypatch.setattr(simulation, "compiler_options", lambda: best)
-    simulation.compiled.cache_clear()
+    monkeypatch.setattr(blocks, "compiler_options", lambda: best)
+    blocks.compiled.cache_clear()
     yield
-    simulation.compiled.cache_clear()
+    blocks.compiled.cache_clear()

@@ -7,11 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 from job import Job
 
-from martths_jax import ADFC, SensorNoise, build_benchmark, draw_plants, indices
-from martths_jax.indices import trials_first
+from martths_jax import ADFC, SensorNoise, build_benchmark, draw_plants
+from martths_jax.indices import final_indices
 from martths_jax.simulation import (
     LANES,
-    Result,
     Setup,
     draw_on,
     fill,
@@ -21,6 +20,7 @@ from martths_jax.simulation import (
 from martths_jax.simulation import (
     prepare as ready,
 )
+from martths_jax.watch import Status, status_of
 from peers.engine import Table
 
 
@@ -43,10 +43,9 @@ def prepare(job: Job, seed: int = 1):
     def run() -> Table:
         tables = []
         for which, noise in blocks:
-            sums, watch, _ = run_block(setup, plants, noise, which, devices, keep=False)
-            sums, watch = trials_first((sums, watch))
-            result = Result(sums, watch, {}, reference, plants.trial[which], bench.fs, "", "adfc")
-            tables.append(np.stack(list(indices(result).values())))
+            ran = run_block(setup, plants, noise, which, devices, keep=False)
+            lost = np.asarray(status_of(ran.watch)) >= Status.DIVERGED
+            tables.append(np.stack(list(final_indices(ran.sums, lost).values())))
         return Table(np.concatenate(tables, axis=1))
 
     return run

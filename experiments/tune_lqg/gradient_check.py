@@ -35,6 +35,7 @@ def main() -> None:
     kind, objective = chosen.controller, Objective.parse("j2+j5+j8")
     benchmark, plants = build_benchmark(), draw_plants(chosen.plants, SEED)
     ground = jnp.asarray(motion(TUNED_ON, chosen.records).acceleration)
+    observers = objective.observers(benchmark.fs)
     noise = draw_noise(SensorNoise(seed=SEED), jnp.asarray(plants.trial), ground.size, benchmark.fs)
     start = start_of(kind)
     names, x = tuple(start), jnp.array(list(start.values()))
@@ -42,11 +43,11 @@ def main() -> None:
 
     def value(x, plants, ground, reference, noise, segment=0):
         ready = build(kind, benchmark, dict(zip(names, x, strict=True)))
-        sums, watch, _, peaks = loop.run(
+        states, _ = loop.run(
             benchmark, ready, plants.discretise(benchmark.dt), ground, reference, noise,
-            trials=len(plants), lags=(1, 1), segment=segment,
+            trials=len(plants), observers=observers, segment=segment,
         )  # fmt: skip
-        return jnp.mean(objective.evaluate(sums, watch, peaks)[0])
+        return jnp.mean(objective.evaluate(observers, states)[0])
 
     def reverse(x, *inputs):
         segment = segment_length(ground.size, 1024)

@@ -17,6 +17,7 @@ from martths_jax.campaign.fields import BY_NAME, FIELDS, SECTIONS
 from martths_jax.campaign.given import EXAMPLE, expand
 from martths_jax.control.base import Controller
 from martths_jax.errors import InputError, argument_error, raise_all
+from martths_jax.indices import DEFAULT, Index, choose
 from martths_jax.motions import DEFAULT_SCALE, Motion
 from martths_jax.published import COMPARED
 from martths_jax.sensors import SensorNoise
@@ -40,6 +41,7 @@ class StudyConfig:
     trials: int = 1000
     seed: int = 1
     controllers: tuple = COMPARED
+    indices: tuple = DEFAULT
     draws: str = "independent"
     spread: float = 1.0
     plants: str | None = None
@@ -86,6 +88,10 @@ class StudyConfig:
             for name in sorted({n for n in names if names.count(n) > 1}):
                 hint = f"; give one a name, as in {EXAMPLE}" if what == "controllers" else ""
                 found.append(f"Argument `{what}` names {name!r} twice{hint}.")
+        try:
+            choose(self.indices)
+        except InputError as error:
+            found.append(str(error))
         if self.plants and self.draws != "independent":
             found.append("Arguments `plants` and `draws` exclude each other; give one of them.")
         return found
@@ -222,6 +228,8 @@ def plain_value(name: str, value):
         return [controller_name(c) for c in value]
     if name == "motions" and value is not None:
         return [m.name if isinstance(m, Motion) else m for m in value]
+    if name == "indices":
+        return [i.name if isinstance(i, Index) else i for i in value]
     if isinstance(value, Mapping):
         return {k: plain_value("", v) for k, v in value.items()}
     return list(value) if isinstance(value, tuple) else value

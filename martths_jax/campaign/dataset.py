@@ -23,12 +23,13 @@ from martths_jax.campaign.files import writing
 from martths_jax.campaign.store import FORMAT, RunFolder
 from martths_jax.errors import InputError
 from martths_jax.files import forgiving
-from martths_jax.indices import NAMES
 from martths_jax.plant import PARAMETERS, Plants
 from martths_jax.watch import Status
 
 ACTUATORS = np.array([1, 2], dtype=np.int32)
-INDEX_UNITS = {"units": "ms for J1 and J4 (positive = late), percent for the others"}
+INDEX_UNITS = {"units": "see the variable `unit`; delays: positive = late"}
+#: Units as files spell them.
+SPELT = {"%": "percent", "mm²": "mm2"}
 #: What the numbers of a status mean, by the conventions of NetCDF.
 STATUS_FLAGS = {
     "flag_values": np.array([int(s) for s in Status], dtype=np.int32),
@@ -47,11 +48,14 @@ _FIRST_WORDS = {
 
 
 def outcome_variables(
-    dims: Sequence[str], gather: Callable[[Callable[[Outcome], np.ndarray]], np.ndarray]
+    identity: dict,
+    dims: Sequence[str],
+    gather: Callable[[Callable[[Outcome], np.ndarray]], np.ndarray],
 ) -> dict:
     """Variables that the results of every campaign have: what became of each run.
 
     Args:
+        identity: of the run.
         dims: of a run: dimensions of the cells, then of their rows.
         gather: puts an array of each cell's ``Outcome``, (rows, ...), together over all cells.
     """
@@ -63,9 +67,7 @@ def outcome_variables(
             "long_name": "how the trial ended"} | STATUS_FLAGS),
         "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
             "long_name": "largest valve command", "units": "V"}),
-        "held": (cell, gather(lambda o: o.held), {
-            "long_name": "fits that the controller did not use", "units": "1"}),
-    }  # fmt: skip
+    } | index_variables(identity) | count_variables(identity, cell, gather)  # fmt: skip
     for i, name in enumerate(FIRSTS):
         variables[f"first_{name}"] = ((*cell, "actuator"), gather(lambda o, i=i: o.first[:, i]), {
             "long_name": f"first sample with {_FIRST_WORDS[name]}; NaN = never",
@@ -91,25 +93,62 @@ def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
         return np.stack([np.stack([pick(outcome) for outcome in row]) for row in cells])
 
     cell = ("controller", "motion", "trial")
-    unit = ["ms" if name.startswith(("J1_", "J4_")) else "percent" for name in NAMES]
-    variables = outcome_variables(cell, gather) | {
+    variables = outcome_variables(identity, cell, gather) | {
         "draw": (("trial", "parameter"), np.asarray(plants.draws), {
             "long_name": "standard normal draws of the plant", "units": "1"}),
         "plant_hz": (("trial", "parameter"), np.asarray(plants.parameters_hz), {
             "long_name": "zeros and poles of the plant; frame_pair is the factor on the pair",
             "units": "Hz"}),
-        "unit": (("index",), np.array(unit), {"long_name": "unit of each index"}),
     }  # fmt: skip
     variables |= _motion_variables(identity)
     coordinates = {
         "controller": np.array(controllers),
         "motion": np.array(motions),
         "trial": np.arange(run.trials + 1, dtype=np.int32),
-        "index": np.array(NAMES),
+        "index": np.array(identity["indices"]),
         "actuator": ACTUATORS,
         "parameter": np.array(PARAMETERS),
     }
     return xr.Dataset(variables, coordinates, attributes(run))
+
+
+def index_variables(identity: dict) -> dict:
+    """What a result file says of each of its indices."""
+    units = [identity["index"][name]["unit"] for name in identity["indices"]]
+    spelt = np.array([SPELT.get(unit, unit) for unit in units])
+    return {"unit": (("index",), spelt, {"long_name": "unit of each index"})}
+
+
+def count_variables(identity: dict, cell: tuple[str, ...], gather) -> dict:
+    """What the controllers counted; zeros where one does not count.
+
+    Args:
+        cell: dimensions; gather: calls a function of an outcome for all of them.
+    """
+    return {
+        name: (cell, gather(lambda o, n=name: o.counts.get(n, np.zeros_like(o.status))), {
+            "long_name": words, "units": "1"})
+        for name, words in identity["counts"].items()
+    }  # fmt: skip
+
+
+def index_names(dataset: xr.Dataset) -> list[str]:
+    """Names of the indices in a result file, in its order."""
+    return [str(name) for name in dataset["index"].values]
+
+
+def unit_of(dataset: xr.Dataset, index: str) -> str:
+    """Unit of an index in a result file, as tables and axes show it."""
+    spelt = str(dataset.unit.sel(index=index).values)
+    return next((unit for unit, words in SPELT.items() if words == spelt), spelt)
+
+
+def units(dataset: xr.Dataset) -> dict[str, list[str]]:
+    """Units in a result file -> the indices that have them, in its order."""
+    found: dict[str, list[str]] = {}
+    for name in index_names(dataset):
+        found.setdefault(unit_of(dataset, name), []).append(name)
+    return found
 
 
 def _motion_variables(identity: dict) -> dict:

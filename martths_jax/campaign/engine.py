@@ -6,7 +6,7 @@ once and serves every motion and controller.  The numbers are the same to the la
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -16,10 +16,11 @@ import numpy as np
 
 from martths_jax.campaign.plan import Plan
 from martths_jax.errors import InputError
-from martths_jax.indices import NAMES, final_indices
+from martths_jax.indices import final_indices
 from martths_jax.runtime import check_precision
 from martths_jax.simulation import (
     LANES,
+    Ran,
     Setup,
     draw_on,
     fill,
@@ -33,36 +34,54 @@ from martths_jax.watch import NEVER, Status, status_of
 FIRSTS = ("saturated", "command", "stroke", "nonfinite")
 
 
+#: Begins the names of columns that hold what controllers count.
+COUNT = "count_"
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What a chunk of T trials gave under one controller and motion.
 
     Attributes:
-        value: (T, 24) indices, NaN where the trial diverged.
+        value: (T, n) indices, NaN where the trial diverged.
         status: (T,) ``Status``.
         first: (T, 4, 2) first samples at which ``FIRSTS`` happened, NaN for never; by actuator.
         volt_peak: (T, 2) largest valve commands [V].
-        held: (T,) number of fits that the controller did not use.
+        counts: (T,) what the controller counted, by the name of its signal.
+        names: of the n indices.
     """
 
     value: np.ndarray
     status: np.ndarray
     first: np.ndarray
     volt_peak: np.ndarray
-    held: np.ndarray
+    counts: dict[str, np.ndarray]
+    names: tuple[str, ...]
 
     def __getitem__(self, which) -> Outcome:
-        return Outcome(*(x[which] for x in self.arrays().values()))
+        return Outcome.of({k: x[which] for k, x in self.arrays().items()}, self.names)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The arrays by name."""
-        return dict(vars(self))
+        """The arrays by the names of their columns."""
+        own = {name: getattr(self, name) for name in COLUMNS}
+        return own | {COUNT + name: x for name, x in self.counts.items()}
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, np.ndarray], names: Iterable[str]) -> Outcome:
+        """From the arrays by the names of their columns, and the names of the indices."""
+        counts = {k.removeprefix(COUNT): x for k, x in arrays.items() if k.startswith(COUNT)}
+        return cls(*(arrays[name] for name in COLUMNS), counts, tuple(names))
 
     @classmethod
     def join(cls, parts: list[Outcome]) -> Outcome:
         """Trials after trials."""
-        columns = zip(*(p.arrays().values() for p in parts), strict=True)
-        return cls(*(np.concatenate(x) for x in columns))
+        columns = [p.arrays() for p in parts]
+        whole = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
+        return cls.of(whole, parts[0].names)
+
+
+#: Columns of every outcome.
+COLUMNS = ("value", "status", "first", "volt_peak")
 
 
 def choose_devices(wanted: int | None) -> list:
@@ -91,6 +110,7 @@ class Engine:
 
     def __init__(self, plan: Plan, devices: list, chunk: int):
         self.plan, self.devices, self.chunk = plan, devices, chunk
+        self.indices = plan.indices
         self.setups: dict[tuple[str, str], Setup] = {}
         self.longest = max(m.acceleration.size for m in plan.motions)
         self._noise: dict[bytes, list] = {}
@@ -123,7 +143,7 @@ class Engine:
             check_precision()  # a block `with jax.enable_x64()` does not reach this thread
             # A motion of one sample: the programs do not depend on its length.
             brief = replace(setup, ground=setup.ground[:1], reference=setup.reference[:1])
-            run_block(brief, plants, noise, which, self.devices, keep=False, retry=False)
+            run_block(brief, plants, noise, which, self.devices, False, False, self.indices)
 
         with ThreadPoolExecutor(len(setups)) as pool:
             list(pool.map(compile_one, setups))
@@ -152,37 +172,36 @@ class Engine:
         blocks = []
         for i, noise in enumerate(self.noise(trial)):
             which = np.arange(i * self.block, min((i + 1) * self.block, trial.size))
-            sums, watch, _ = run_block(setup, plants, noise, which, self.devices, keep=False)
-            blocks.append(self.outcome(setup, sums, watch, trial[which]))
+            ran = run_block(
+                setup, plants, noise, which, self.devices, keep=False, indices=self.indices
+            )
+            blocks.append(self.outcome(ran, which.size))
         return Outcome.join(blocks)
 
     def signals(self, controller: str, motion: str, trial: np.ndarray, device) -> dict:
         """Signals (T, N, ...) of at most ``LANES`` trials, run again on one device."""
         setup = self.setup(controller, motion)
         noise = self._drawn(trial, [device])[0]
-        _, _, signals = run_block(
-            setup,
-            self.plan.draws.plants(trial),
-            noise,
-            np.arange(trial.size),
-            [device],
-            keep=True,
-        )
-        return signals
+        which = np.arange(trial.size)
+        plants = self.plan.draws.plants(trial)
+        return run_block(
+            setup, plants, noise, which, [device], keep=True, indices=self.indices
+        ).signals
 
-    def outcome(self, setup: Setup, sums, watch, trial: np.ndarray) -> Outcome:
-        """What the sums and watch of a block with the given trials (T,) come to."""
+    def outcome(self, ran: Ran, trials: int) -> Outcome:
+        """What a block of so many trials comes to."""
         # As many trials in every block, so that the few operations here compile once.
-        lanes = fill(np.arange(trial.size), self.block)
-        sums, watch = jax.tree.map(lambda x: np.asarray(x)[..., lanes], (sums, watch))
+        lanes = fill(np.arange(trials), self.block)
+        sums, watch, counts = jax.tree.map(lambda x: np.asarray(x)[..., lanes], ran[:3])
         status = np.asarray(status_of(watch, sums))
         found = final_indices(sums, status >= Status.DIVERGED)
         first = np.stack([np.asarray(getattr(watch, name)) for name in FIRSTS])
         whole = Outcome(
-            value=np.stack([found[name] for name in NAMES], axis=-1),
+            value=np.stack(list(found.values()), axis=-1),
             status=status.astype(np.int32),
             first=np.moveaxis(np.where(first >= NEVER, np.nan, first), -1, 0),
             volt_peak=np.asarray(watch.volt_peak).T,
-            held=np.asarray(watch.held).astype(np.int32),
+            counts={name: x.astype(np.int32) for name, x in counts.items()},
+            names=tuple(found),
         )
-        return whole[: trial.size]
+        return whole[:trials]

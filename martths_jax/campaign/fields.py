@@ -9,6 +9,7 @@ from typing import Any
 
 from martths_jax.benchmark import FORCE_FROM, PARTITIONS
 from martths_jax.control.registry import names as known
+from martths_jax.indices import GROUPS
 from martths_jax.structure.integrators import INTEGRATORS
 
 DRAWS = ("independent", "lhs", "sobol")
@@ -88,6 +89,9 @@ FIELDS = (
     Field("controllers", "study", _is_list, "be a list of at least one controller",
           f"Controllers to compare: {', '.join(known())}, package.module:Class, file.py:Class, "
           "NAME=KIND{KEY=VALUE,...}, or names of [controller.NAME] tables."),
+    Field("indices", "study", _is_list, "be a list of at least one index",
+          f"What is evaluated: groups ({', '.join(GROUPS)}), names such as J2_1 or TI, or "
+          "package.module:NAME of your own."),
     Field("draws", "study", one_of(DRAWS), _choice(DRAWS),
           "independent (extendable), lhs or sobol (spread evenly; they depend on `trials`)."),
     Field("spread", "study", lambda v: is_number(v) and v >= 0, "be zero or positive",

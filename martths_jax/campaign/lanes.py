@@ -85,8 +85,8 @@ class LaneEngine(Engine):
             np.asarray(noise_trial)[lanes], deviation[lanes], setup.ground.shape[0]
         )
         which = np.arange(cell.size)
-        sums, watch, _ = run_block(setup, plants, noise, which, self.devices, keep=False)
-        return self.outcome(setup, sums, watch, np.asarray(plants.trial))
+        ran = run_block(setup, plants, noise, which, self.devices, keep=False, indices=self.indices)
+        return self.outcome(ran, which.size)
 
 
 class Worlds:

@@ -80,7 +80,7 @@ def check_part(about: dict, asked: dict, machines) -> None:
     """
     for key, value in asked.items():
         if about.get(key) != value:
-            what = "of another study" if key == "identity" else f"of {key} {about.get(key)!r}"
+            what = "of another study" if key == "identity" else f"of {key} {about.get(key)}"
             raise Foreign(f"it is {what}")
     if about.get("machine") not in machines:
         raise Foreign("it was computed on another kind of machine")

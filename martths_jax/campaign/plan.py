@@ -19,6 +19,7 @@ from martths_jax.control.entry import Entry
 from martths_jax.control.registry import find, find_class, names
 from martths_jax.errors import InputError, raise_all
 from martths_jax.files import name_problems
+from martths_jax.indices import Index, choose
 from martths_jax.motions import BUILTIN_NAMES, Motion, load_motion
 from martths_jax.motions.catalogue import BENCHMARK_NAMES, record_files
 from martths_jax.sensors import SensorNoise
@@ -70,6 +71,17 @@ class Plan:
                     inside = sign + inside if sign and not inside.endswith(".py") else ""
                     found[name]["kind"] = f"{copy_name(one)}{inside}"
         return found
+
+    @property
+    def indices(self) -> tuple[Index, ...]:
+        """What is evaluated."""
+        return choose(self.config.indices)
+
+    @property
+    def counts(self) -> dict[str, str]:
+        """What the controllers count, in words by the names of their signals."""
+        signals = [s for c in self.controllers.values() for s in c.signals if s.count]
+        return {signal.name: signal.label or signal.name for signal in signals}
 
     @property
     def trials(self) -> int:

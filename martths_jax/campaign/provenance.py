@@ -17,7 +17,8 @@ import martths_jax
 from martths_jax.campaign.config import as_settings
 from martths_jax.campaign.fields import RUN_ONLY
 from martths_jax.campaign.plan import Plan, motion_identity
-from martths_jax.campaign.sources import UNKNOWN, engine_code
+from martths_jax.campaign.sources import UNKNOWN, code_of, engine_code
+from martths_jax.indices import Index
 
 #: Packages whose version can change the last bits of a result.
 PACKAGES = ("jax", "jaxlib", "numpy", "scipy")
@@ -96,18 +97,34 @@ def identity(plan: Plan) -> dict:
     """
     settings = as_settings(plan.config)
     loaded = {"records", "motions", "scale", "pga", "sa", "units", "dt", "variable", "resample",
-              "trials", "plants", "plants_as", "controller", "controllers"}  # fmt: skip
+              "trials", "plants", "plants_as", "controller", "controllers", "indices"}  # fmt: skip
     found = {k: v for k, v in settings.items() if k not in loaded | RUN_ONLY}
     if plan.draws.table is not None:
         found |= {"trials": plan.trials, "plants_sha256": plan.draws.sha256}
     found["controllers"] = list(plan.controllers)
     found["controller"] = plan.controller_settings
+    found["indices"] = [index.name for index in plan.indices]
+    found["index"] = {index.name: index_identity(index) for index in plan.indices}
+    found["counts"] = plan.counts
     found["motions"] = [m.name for m in plan.motions]
     found["motion"] = {m.name: motion_identity(m) for m in plan.motions}
     found["versions"] = versions()
     found["precision"] = str(np.dtype(jnp.zeros(()).dtype))
     found["code"] = engine_code()
     return found
+
+
+def index_identity(index: Index) -> dict:
+    """What identifies an index: its row of the table, and the code of a kind of the user's."""
+    found = {
+        "unit": index.unit,
+        "kind": f"{index.kind}{f': {index.of}' if index.of else ''}",
+        "pair": " against ".join(f"{row.signal}[{row.row}]" for row in index.pair),
+        "label": index.label,
+        "source": index.source,
+    }
+    own = type(index.kind).__module__.split(".")[0] == martths_jax.__name__
+    return found if own else found | {"code": code_of(index.kind)}
 
 
 def differences(stored: dict, asked: dict, prefix: str = "") -> list[str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from martths_jax.campaign.checksum import json_digest
-from martths_jax.campaign.engine import Outcome
+from martths_jax.campaign.engine import COLUMNS, COUNT, Outcome
 from martths_jax.campaign.files import set_aside, write_bytes
 from martths_jax.campaign.machine import machine_digest
 from martths_jax.campaign.owner import Owner
@@ -43,6 +43,11 @@ class Stored:
         """(controller, motion) in the order they run: controllers within a motion."""
         identity = self.header["identity"]
         return [(c, m) for m in identity["motions"] for c in identity["controllers"]]
+
+    @property
+    def indices(self) -> list[str]:
+        """Names of the indices that are stored."""
+        return self.header["identity"]["indices"]
 
     @cached_property
     def digest(self) -> str:
@@ -89,6 +94,8 @@ class Stored:
         Raises:
             InputError: the disk refuses, or the folder is no longer this run's.
         """
+        if list(outcome.names) != self.indices:
+            raise ValueError(f"a run of {self.indices} is given {outcome.names}")
         for span in np.split(np.arange(trial.size), np.flatnonzero(np.diff(trial) != 1) + 1):
             first, last = int(trial[span[0]]), int(trial[span[-1]])
             about = self._about(controller, motion, first, last)
@@ -100,7 +107,7 @@ class Stored:
 
     def _about(self, controller: str, motion: str, first: int, last: int) -> dict:
         return {"identity": self.digest, "controller": controller, "motion": motion,
-                "first": first, "last": last}  # fmt: skip
+                "first": first, "last": last, "indices": self.indices}  # fmt: skip
 
     def _part(self, controller, motion, first: int, last: int, path: Path) -> dict[str, np.ndarray]:
         """Columns of a part of this run.
@@ -114,10 +121,11 @@ class Stored:
         except OSError as error:
             raise InputError(f"{path} cannot be read ({error.strerror or error}).") from None
         check_part(about, self._about(controller, motion, first, last), self.header["machines"])
-        if set(columns) != set(Outcome.__dataclass_fields__) or any(
-            x.shape[0] != last - first + 1 for x in columns.values()
-        ):
+        own = {name for name in columns if not name.startswith(COUNT)}
+        if own != set(COLUMNS) or any(x.shape[0] != last - first + 1 for x in columns.values()):
             raise Foreign("it holds other columns")
+        if columns["value"].shape[1:] != (len(self.indices),):
+            raise Foreign("it holds other indices than it says")
         return columns
 
     def read(self, controller: str, motion: str) -> Outcome:
@@ -143,7 +151,7 @@ class Stored:
                 columns.setdefault(name, np.empty(shape, values.dtype))[first : last + 1] = values
             seen[first : last + 1] = True
         raise_all(missing_spans(seen, f"{controller} on {motion}"), f"{self.path} is not complete")
-        return Outcome(**columns)
+        return Outcome.of(columns, self.indices)
 
     def missing(self) -> list[str]:
         """Sentences about trials that are not there yet."""

@@ -28,13 +28,16 @@ from martths_jax.cli.motion_options import (
     load_all,
 )
 from martths_jax.cli.options import Trial, option, required, setting
-from martths_jax.control.controllers import Controller
+from martths_jax.control.base import Controller
 from martths_jax.errors import argument_error
 from martths_jax.files import atomic, safe_name
-from martths_jax.indices import indices
+from martths_jax.indices import DEFAULT, choose
+from martths_jax.indices import indices as evaluate
+from martths_jax.indices.table import units_in_words
 from martths_jax.motions import available_motions
 from martths_jax.nominal import Comparison, compare_with_table4
 from martths_jax.plant import draw_plants, nominal_plant
+from martths_jax.published import COMPARED, PROPOSED
 from martths_jax.screen import ScreenTable
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import simulate
@@ -83,7 +86,7 @@ def _like(value: float, printed: float) -> str:
 def run(
     motion: required("motions"),
     out: required("out", "a folder"),
-    controller: setting("controllers", "adfc") = None,
+    controller: setting("controllers", PROPOSED) = None,
     trial: Trial = 0,
     seed: Seed = 0,
     fs: setting("fs") = 1024.0,
@@ -96,6 +99,7 @@ def run(
     dt: Dt = None,
     variable: Variable = None,
     resample: Resample = None,
+    indices: setting("indices", "benchmark") = None,
     matlab: option(bool, "--matlab", help="Write all of it as a MATLAB file NAME.mat too") = False,
 ) -> None:
     """Run one trial and save its signals and indices.
@@ -108,13 +112,16 @@ def run(
     motions = load_all(motion, records, scale, pga, sa, units, resample, fs, dt, variable)
     benchmark = build_benchmark(fs, integrator)
     plants = nominal_plant() if trial == 0 else draw_plants(1, seed, first=trial)
-    drives = [build_controller(given, benchmark) for given in controller or ["adfc"]]
+    drives = [build_controller(given, benchmark) for given in controller or PROPOSED]
+    evaluated = choose(indices or DEFAULT)
     lost = []
     names = ", ".join(drive.name for drive, _ in drives)
     with progress(f"{names}, trial {trial}", len(motions) * len(drives)) as tell:
         for done, (one, (drive, chosen)) in enumerate(product(motions, drives), 1):
             about = {"trial": trial, "seed": seed, "integrator": integrator, "settings": chosen}
-            result = simulate(benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True)
+            result = simulate(
+                benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True, indices=evaluated
+            )
             _save_run(out, one, drive.name, result, about, matlab)
             console.print(str(result), highlight=False)
             _print_indices(result)
@@ -136,7 +143,7 @@ def _save_run(out: Path, motion, name: str, result, settings: dict, mat: bool) -
         "ref": result.reference,
         **{key: np.asarray(value)[0] for key, value in result.signals.items()},
     }
-    values = {key: float(v[0]) for key, v in indices(result).items()}
+    values = {key: float(v[0]) for key, v in evaluate(result).items()}
     about = settings | {
         "motion": motion.name,
         "source": motion.source,
@@ -166,10 +173,11 @@ def _for_matlab(value):
 
 
 def _print_indices(result) -> None:
-    rows = [(name, f"{value[0]:.3f}") for name, value in indices(result).items()]
+    rows = [(name, f"{value[0]:.3f}") for name, value in evaluate(result).items()]
     # Four indices a line.
     lines = [tuple(c for row in rows[i : i + 4] for c in row) for i in range(0, len(rows), 4)]
-    title = f"{result.controller}, {result.motion}: J1, J4 in ms, the others in %"
+    told = units_in_words(result.sums.indices)
+    title = f"{result.controller}, {result.motion}: {told}"
     console.print(ScreenTable(title, ("index", "value") * 4, lines, keys=0, text=("index",)))
 
 
@@ -182,8 +190,10 @@ def table4(
     units: Units = None,
     dt: Dt = None,
     variable: Variable = None,
+    controller: setting("controllers", COMPARED) = None,
+    indices: setting("indices", "benchmark") = None,
 ) -> None:
-    """The 48 numbers of Table 4 (24 indices, LQG and ADFC, nominal plant) beside those in print.
+    """The numbers of Table 4 (24 indices, nominal plant) beside those in print.
 
     Uses El Centro, Kobe and Morgan Hill from --records (or $MARTHS_RECORDS), and the built-in
     motions that behave like them where those are not found.
@@ -193,8 +203,12 @@ def table4(
         raise argument_error("--motion", "name at least one motion", "none")
     motions = load_all(names, records, scale, units=units, dt=dt, variable=variable)
     benchmark = build_benchmark()
-    with progress("Table 4", 2 * len(motions)) as tell:
-        found = compare_with_table4(benchmark, motions, noise=SensorNoise(seed=seed), progress=tell)
+    drives = [build_controller(given, benchmark)[0] for given in controller or COMPARED]
+    with progress("Table 4", len(drives) * len(motions)) as tell:
+        found = compare_with_table4(
+            benchmark, motions, drives, noise=SensorNoise(seed=seed), progress=tell,
+            indices=indices or DEFAULT,
+        )  # fmt: skip
     _print_comparison(found)
     if out:
         for name, text in (("table4.md", found.to_markdown()), ("table4.csv", found.to_csv())):

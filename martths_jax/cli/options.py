@@ -26,25 +26,29 @@ from martths_jax.campaign.config import StudyConfig, as_settings
 from martths_jax.campaign.fields import BY_NAME, Field
 from martths_jax.campaign.given import split_list
 from martths_jax.errors import InputError, argument_error
+from martths_jax.indices import GROUPS
 
 #: Types of the settings that are no text.
 _TYPES = {"trials": int, "seed": int, "spread": float, "plants": Path, "records": Path,
           "scale": float, "dt": float, "fs": float, "noise_power": float, "noise_shared": bool,
           "out": Path, "signals": bool, "devices": int, "memory_gb": float, "max_failed": int,
-          "controllers": list[str], "motions": list[str], "keep": list[str]}  # fmt: skip
+          "controllers": list[str], "motions": list[str], "indices": list[str],
+          "keep": list[str]}  # fmt: skip
 #: Settings whose option is not just their name.
 _NAMES = {"controllers": ("--controller", "--controllers"), "motions": ("--motion", "--motions"),
           "memory_gb": ("--memory",), "signals": ("--signals/--no-signals",),
           "noise_shared": ("--noise-shared/--noise-apart",)}  # fmt: skip
 _METAVARS = {"controllers": "[NAME=]KIND[{KEY=VALUE,...}]", "motions": "NAME|FILE", "out": "PATH",
              "plants": "FILE", "records": "DIR", "dt": "S", "variable": "NAME|NUMBER",
-             "keep": "TRIAL"}  # fmt: skip
+             "keep": "TRIAL", "indices": "NAME"}  # fmt: skip
 #: Texts with more to say than a line of a configuration file has room for.
 _HELP = {
     "motions": "Built-in motion (elcentro-like, kobe-like, morganhill-like), name under --records, "
     "or path of a file (.mat, .npy, .AT2, .V2, .smc, .csv ...); repeated or with commas",
     "controllers": "A name such as lqg or adfc, package.module:Class or path/file.py:Class, also "
     "with settings: 'slow=adfc{nb=2048,no=2047}'; repeated or with commas",
+    "indices": f"What is evaluated: {', '.join(GROUPS)}, names such as J2_1 or TI, or package."
+    "module:NAME of your own; repeated or with commas",
     "out": "Where the results go",
     "plants": "CSV file of the nine parameters of each plant",
     "signals": "Signals of chosen trials too",
@@ -52,9 +56,9 @@ _HELP = {
 }
 
 #: Settings of a study that say what is run and where; every campaign has them.
-STUDY = ("trials", "seed", "controllers", "motions", "records", "scale", "pga", "sa", "units",
-         "dt", "variable", "resample", "spread", "fs", "integrator", "partition", "noise_power",
-         "noise_shared", "out", "devices")  # fmt: skip
+STUDY = ("trials", "seed", "controllers", "indices", "motions", "records", "scale", "pga", "sa", "units",
+         "dt", "variable", "resample", "spread", "fs", "integrator", "partition", "force_from",
+         "noise_power", "noise_shared", "out", "devices")  # fmt: skip
 #: Settings of how its plants are drawn.
 DRAWN = ("draws", "plants", "plants_as")
 

@@ -83,18 +83,25 @@ class DelayLine:
 
 @dataclass(frozen=True)
 class Signal:
-    """A signal that a controller gives beside its command.
+    """What is said of a signal: one of the loop's own, or one that a controller gives.
 
     Attributes:
         name: key in ``Decision.signals``.
         dims: names of its axes before the trials.
         unit: of its values; label: what it is, in words.
+        elements: names of its elements for a legend, the last axis counting fastest.
+        count: it counts events from the first sample on, one number (T,) a trial; what it stands
+            at in the end is kept with the results of every run, see ``observers.Counts``.
+        stored: whether it is kept where signals are.
     """
 
     name: str
     dims: tuple[str, ...] = ()
     unit: str = "1"
     label: str = ""
+    elements: tuple[str, ...] = ()
+    count: bool = False
+    stored: bool = True
 
 
 class Estimator(ABC):

@@ -17,12 +17,13 @@ import numpy as np
 
 from martths_jax.control.base import Controller, Decision, DelayLine, Observation
 from martths_jax.errors import InputError
+from martths_jax.signals import SIGNALS
 
 #: Number of trials to trace with: that of a block, so that JAX need not trace the stages of a
 #: sample again for it; or the next one that no array of the controller ends in.
 PROBE = 64
 #: Signals that the loop itself gives: one of these names would replace what the indices see.
-RESERVED = ("x_a", "x_m", "x_hat", "u", "num", "est", "force")
+RESERVED = tuple(signal.name for signal in SIGNALS)
 #: Controllers that were found good: key of ``_key`` -> which leaves hold one value a trial.
 _GOOD: dict[tuple, tuple[bool, ...]] = {}
 _MOST_KEPT = 256
@@ -333,6 +334,5 @@ class _Look:
                     f"give signal `{name}` the axes that it declares, "
                     f"({', '.join([*told.dims, 'trials'])})", self.shape(value),
                 )  # fmt: skip
-            if name == "held" and jnp.shape(value) != (self.trials,):
-                self.refuse("count one number of fits not used a trial in `held`",
-                            self.shape(value))  # fmt: skip
+            if told is not None and told.count and jnp.shape(value) != (self.trials,):
+                self.refuse(f"count one number a trial in `{name}`", self.shape(value))

@@ -39,7 +39,7 @@ def figure_list(source: Source) -> dict[str, Callable[[], Drawing]]:
             head = f"fig{number:02d}_" if number else ""
             found[f"{head}strokes_{safe_name(motion)}"] = partial(histories.strokes, source, motion)
         for controller in source.controllers:
-            if "C_A" in source.history(controller, source.motion):
+            if source.coefficients(controller, source.motion) is not None:
                 draw = partial(histories.coefficients, source, controller)
                 found[f"fig11_coefficients{tails[controller]}"] = draw
         found["fig12_synchronisation_actuators"] = partial(synchronisation.actuators, source)

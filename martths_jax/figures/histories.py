@@ -77,7 +77,7 @@ def coefficients(source: Source, controller: str) -> Drawing:
     """
     motion = source.motion
     time = source.shared(motion).time.values
-    history = source.history(controller, motion)["C_A"]  # (N, 8, 2)
+    history = source.coefficients(controller, motion)  # (N, 8, 2)
     step = 1e3 / source.fs  # ms
     units = ("1", "ms", "ms²", "ms³")
     figure = new_figure(DOUBLE, 130)

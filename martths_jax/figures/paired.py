@@ -14,7 +14,6 @@ from martths_jax.figures.style import (
     motion_label,
     new_figure,
 )
-from martths_jax.indices import NAMES
 
 
 def paired(source: Source, pair: tuple[str, str]) -> Drawing:
@@ -23,6 +22,7 @@ def paired(source: Source, pair: tuple[str, str]) -> Drawing:
     The difference is that of magnitudes of the same trial, in percent of the second controller's
     median, so that milliseconds and percents share an axis.
     """
+    names = source.indices
     figure = new_figure(DOUBLE, 100)
     top, bottom = figure.subplots(2, 1, sharex=True)
     columns: dict[str, list] = {
@@ -35,9 +35,9 @@ def paired(source: Source, pair: tuple[str, str]) -> Drawing:
     width = 0.66 / len(source.motions)
     for i, motion in enumerate(source.motions):
         shape = look(i)
-        at = np.arange(len(NAMES)) + (i - (len(source.motions) - 1) / 2) * width
+        at = np.arange(len(names)) + (i - (len(source.motions) - 1) / 2) * width
         bars, wins = [], []
-        for name in NAMES:
+        for name in names:
             first, second = (source.values(c, motion, name) for c in pair)
             found = compare(first, second)
             size = float(np.nanmedian(np.abs(second))) if np.isfinite(second).any() else np.nan
@@ -61,11 +61,11 @@ def paired(source: Source, pair: tuple[str, str]) -> Drawing:
     top.set_ylabel(f"median |{first}| − |{second}|\n[% of {second}'s median]")
     bottom.set_ylabel(f"{first} better\n[% of trials]")
     bottom.set_ylim(-3, 103)
-    bottom.set_xticks(np.arange(len(NAMES)), [index_label(n) for n in NAMES], rotation=60)
+    bottom.set_xticks(np.arange(len(names)), [index_label(n) for n in names], rotation=60)
     for axis in (top, bottom):
         axis.grid(axis="x", visible=False)
-        axis.set_xlim(-0.6, len(NAMES) - 0.4)
-        for edge in range(len(NAMES) - 1):
+        axis.set_xlim(-0.6, len(names) - 0.4)
+        for edge in range(len(names) - 1):
             axis.axvline(edge + 0.5, color="0.9", lw=0.4, zorder=0)
     handles, labels = top.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))

@@ -8,10 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.dataset import index_names, unit_of, units
 from martths_jax.errors import InputError
 from martths_jax.figures.style import Names
 from martths_jax.study import Study, open_study
 
+#: Axes of a signal that holds the coefficients of a command.
+COEFFICIENTS = ("coefficient", "actuator")
 #: Zoom windows of the benchmark's plots [s], by the record's name (benchmark's plotting scripts).
 ZOOM = {
     "elcentro": ((7.0, 8.0), (14.0, 15.0), (31.0, 32.0)),
@@ -49,6 +52,28 @@ class Source:
     def motions(self) -> list[str]:
         """Names of the motions, in the study's order."""
         return [str(m) for m in self.study.dataset.motion.values]
+
+    @property
+    def indices(self) -> list[str]:
+        """Names of the indices, in the study's order."""
+        return index_names(self.study.dataset)
+
+    @cached_property
+    def units(self) -> dict[str, list[str]]:
+        """Units -> the indices that have them."""
+        return units(self.study.dataset)
+
+    def unit(self, index: str) -> str:
+        """Unit of an index."""
+        return unit_of(self.study.dataset, index)
+
+    def coefficients(self, controller: str, motion: str) -> np.ndarray | None:
+        """(N, 8, 2) what a controller calls the coefficients of its command; None without."""
+        stored = self.study.signals(motion, controller)
+        for name, variable in stored.data_vars.items():
+            if variable.dims[2:] == COEFFICIENTS and variable.shape[2:] == (8, 2):
+                return self.history(controller, motion)[name]
+        return None
 
     @property
     def fs(self) -> float:

@@ -16,9 +16,9 @@ from martths_jax.figures.style import (
     motion_label,
     new_figure,
 )
-from martths_jax.indices import DELAYS, NAMES
 
-ERRORS = tuple(n for n in NAMES if n not in DELAYS)
+#: What an axis shows, by the unit of its indices.
+WORDS = {"ms": "delay [ms]", "%": "error [%]"}
 PERCENTS = (5, 25, 50, 75, 95)
 #: Steps of a distribution function that are drawn, at most.
 STEPS = 2000
@@ -27,39 +27,47 @@ STEPS = 2000
 def controllers(source: Source) -> Drawing:
     """Median and interquartile range of all indices, controller beside controller (Figure 14a)."""
     samples = {
-        c: {n: source.values(c, source.motion, n) for n in NAMES} for c in source.controllers
+        c: {n: source.values(c, source.motion, n) for n in source.indices}
+        for c in source.controllers
     }
     places = {c: source.position(c) for c in samples}
     caption = (
         f"Median (marker), interquartile range (bar) and P5-P95 (line) of the indices over the "
         f"uncertain plants, {motion_label(source.motion)}."
     )
-    return _ranges(samples, places, source.label, "controller", caption)
+    return _ranges(source, samples, places, source.label, "controller", caption)
 
 
 def motions(source: Source, controller: str) -> Drawing:
     """The same of one controller, motion beside motion (Figure 14b)."""
-    samples = {m: {n: source.values(controller, m, n) for n in NAMES} for m in source.motions}
+    samples = {
+        m: {n: source.values(controller, m, n) for n in source.indices} for m in source.motions
+    }
     places = {m: i for i, m in enumerate(samples)}
     caption = (
         f"Median (marker), interquartile range (bar) and P5-P95 (line) of the indices over the "
         f"uncertain plants, {source.label(controller)}, motion by motion."
     )
-    return _ranges(samples, places, motion_label, "motion", caption)
+    return _ranges(source, samples, places, motion_label, "motion", caption)
 
 
 def _ranges(
-    samples: Mapping[str, Mapping[str, np.ndarray]], places, label, what: str, caption: str
-) -> Drawing:
+    source: Source, samples: Mapping[str, Mapping[str, np.ndarray]], places, label, what: str,
+    caption: str,
+) -> Drawing:  # fmt: skip
     figure = new_figure(DOUBLE, 82)
-    left, right = figure.subplots(1, 2, width_ratios=[len(DELAYS) + 0.7, len(ERRORS)])
+    units = source.units
+    widths = [len(names) + (0.7 if unit == "ms" else 0.0) for unit, names in units.items()]
+    axes = figure.subplots(1, len(units), width_ratios=widths, squeeze=False)[0]
     rows: dict[str, list] = {k: [] for k in (what, "index", *(f"P{p}" for p in PERCENTS))}
     width = 0.8 / len(samples)
-    for axis, names, unit in ((left, DELAYS, "delay [ms]"), (right, ERRORS, "error [%]")):
+    for axis, (unit, names) in zip(axes, units.items(), strict=True):
+        smallest = np.inf
         for i, (key, found) in enumerate(samples.items()):
             shape = look(places[key])
             at = np.arange(len(names)) + (i - (len(samples) - 1) / 2) * width
             low, q1, middle, q3, high = np.array([_percentiles(found[n]) for n in names]).T
+            smallest = min(smallest, np.nanmin(low, initial=np.inf))
             axis.vlines(at, low, high, color=shape["color"], lw=0.7)
             axis.vlines(at, q1, q3, color=shape["color"], lw=3.2, alpha=0.45)
             axis.plot(at, middle, ls="", marker=shape["marker"], ms=3, color=shape["color"],
@@ -69,14 +77,15 @@ def _ranges(
                 for column, value in zip(rows, (key, n, *values), strict=True):
                     rows[column].append(value)
         axis.set_xticks(np.arange(len(names)), [index_label(n) for n in names], rotation=60)
-        axis.set_ylabel(unit)
+        axis.set_ylabel(WORDS.get(unit, f"[{unit}]"))
         axis.set_xlim(-0.6, len(names) - 0.4)
         axis.grid(axis="x", visible=False)
         for edge in range(len(names) - 1):
             axis.axvline(edge + 0.5, color="0.9", lw=0.4, zorder=0)
-    right.set_yscale("log")
-    _plain_log_ticks(right.yaxis)
-    handles, labels = right.get_legend_handles_labels()
+        if unit == "%" and smallest > 0:
+            axis.set_yscale("log")
+            _plain_log_ticks(axis.yaxis)
+    handles, labels = axes[-1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     return Drawing(figure, rows, caption)
 
@@ -95,8 +104,10 @@ def _plain_log_ticks(axis) -> None:
 
 
 def histograms(source: Source) -> Drawing:
-    """Histograms of J2 ... J10 of one motion (Figure 15)."""
-    columns: dict[str, list] = {"index": [], "from_percent": [], "to_percent": []}
+    """Histograms of all indices of one motion but the delays (Figure 15)."""
+    errors = [n for n in source.indices if source.unit(n) != "ms"] or source.indices
+    tail = "_percent" if all(source.unit(n) == "%" for n in errors) else ""
+    columns: dict[str, list] = {"index": [], f"from{tail}": [], f"to{tail}": []}
     columns |= {f"trials_{c}": [] for c in source.controllers}
 
     def panel(axis, name: str) -> None:
@@ -111,10 +122,10 @@ def histograms(source: Source) -> Drawing:
                         zorder=1 if filled else 3)  # fmt: skip
             columns[f"trials_{c}"] += counts.tolist()
         columns["index"] += [name] * (edges.size - 1)
-        columns["from_percent"] += edges[:-1].tolist()
-        columns["to_percent"] += edges[1:].tolist()
+        columns[f"from{tail}"] += edges[:-1].tolist()
+        columns[f"to{tail}"] += edges[1:].tolist()
 
-    figure = _panels(ERRORS, panel, 178, "trials")
+    figure = _panels(source, errors, panel, 178, "trials")
     names = " and ".join(map(source.label, source.controllers))
     caption = (
         f"Histograms of the error indices over the uncertain plants, {names}, "
@@ -156,9 +167,9 @@ def ecdf(source: Source) -> Drawing:
                 columns[column] += list(values)
         axis.set_ylim(0, 1)
 
-    figure = _panels(NAMES, panel, 205, "share of trials")
+    figure = _panels(source, source.indices, panel, 205, "share of trials")
     caption = (
-        "Empirical distribution functions of the 24 indices over the uncertain plants that "
+        "Empirical distribution functions of the indices over the uncertain plants that "
         f"finished, {motion_label(source.motion)}."
     )
     if trials > STEPS:
@@ -175,14 +186,21 @@ def _spaced(size: int, most: int) -> np.ndarray:
     return np.linspace(0, size - 1, most).round().astype(int)
 
 
-def _panels(names, panel, height: float, ylabel: str):
-    """Small panels, four in a row, one an index, with a common legend."""
-    figure = new_figure(DOUBLE, height)
-    axes = figure.subplots(-(-len(names) // 4), 4, squeeze=False)
+def _panels(source: Source, names, panel, height: float, ylabel: str):
+    """Small panels, four in a row, one an index, with a common legend.
+
+    Args:
+        height: of a figure of five or six rows [mm]; more make it higher.
+    """
+    rows = -(-len(names) // 4)
+    figure = new_figure(DOUBLE, height * max(1.0, rows / 6))
+    axes = figure.subplots(rows, 4, squeeze=False)
     for axis, name in zip(axes.flat, names, strict=False):
         panel(axis, name)
-        axis.set_xlabel(f"{index_label(name)} [{'ms' if name in DELAYS else '%'}]", labelpad=1)
+        axis.set_xlabel(f"{index_label(name)} [{source.unit(name)}]", labelpad=1)
         axis.locator_params(axis="both", nbins=4)
+    for axis in axes.flat[len(names) :]:
+        axis.set_visible(False)
     for axis in axes[:, 0]:
         axis.set_ylabel(ylabel)
     handles, labels = axes[0, 0].get_legend_handles_labels()

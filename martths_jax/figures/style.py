@@ -7,6 +7,7 @@ shade of clearly other lightness tells too.
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from martths_jax.files import atomic
 from martths_jax.text import csv_cell
 
 MM = 1 / 25.4  # inch per mm
+_NAME = re.compile(r"([A-Z]+|[A-Za-z]+)(\d*)([a-z]*)_(\w+)")
 #: Widths of one and of two journal columns [mm].
 SINGLE, DOUBLE = 85.0, 174.0
 BLUE, VERMILLION, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
@@ -129,9 +131,16 @@ class Names:
 
 
 def index_label(name: str) -> str:
-    """``J5_28`` as it is typeset."""
-    number, _, where = name[1:].partition("_")
-    return f"$J_{{{number},{where}}}$"
+    """The name of an index as it is typeset: a capital with a number as its subscript, ``J5_28``;
+    other words upright, ``TI_1``; what follows either in small letters above, ``J2true_1``."""
+    match = _NAME.fullmatch(name)
+    if not match:
+        return name
+    word, number, more, where = match.groups()
+    below = ",".join(part for part in (number, where.replace("_", ",")) if part)
+    above = rf"^{{\mathrm{{{more}}}}}" if more else ""
+    word = word if len(word) == 1 else rf"\mathrm{{{word}}}"
+    return f"${word}_{{{below}}}{above}$"
 
 
 def motion_label(name: str) -> str:

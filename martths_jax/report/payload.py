@@ -12,14 +12,15 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from martths_jax.indices import NAMES
-from martths_jax.report.tables import unit_of
+from martths_jax.campaign.dataset import index_names, unit_of
+from martths_jax.signals import SIGNALS
 from martths_jax.study import Study
 from martths_jax.watch import Status
 
 #: Runs in the table of all trials, at most; of a larger study it holds a sample of the trials.
 RUNS = 12_000
-#: Coefficients change slowly: every so manieth of the samples kept of the other signals.
+#: What only one controller gives, such as coefficients, changes slowly: every so manieth of the
+#: samples kept of the other signals.
 SLOWER = 4
 STEPS = 32767
 #: What goes with a signal beside its values [bytes].
@@ -77,10 +78,10 @@ def trial_payload(study: Study, trials: np.ndarray) -> dict:
                 "controller": controller,
                 "motion": motion,
                 "status": cell.status.values.tolist(),
-                "values": [_rounded(cell.value.values[:, i]) for i in range(len(NAMES))],
+                "values": [_rounded(cell.value.values[:, i]) for i in range(cell.value.shape[1])],
             })  # fmt: skip
     return {
-        "indices": [{"name": n, "unit": unit_of(n)} for n in NAMES],
+        "indices": [{"name": n, "unit": unit_of(dataset, n)} for n in index_names(dataset)],
         "status": {int(s): s.name.lower() for s in Status},
         "trials": trials.tolist(),
         "cells": cells,
@@ -129,9 +130,18 @@ def _weight(stored) -> float:
     return 2 + 2 + stored["force"].shape[-1] + _coefficients(stored) / SLOWER
 
 
+def _own(stored) -> list[str]:
+    """Names of the signals that only this controller gives."""
+    shared = {signal.name for signal in SIGNALS}
+    return [
+        str(name) for name, v in stored.data_vars.items()
+        if "time" in v.dims and name not in shared and "count" not in v.attrs
+    ]  # fmt: skip
+
+
 def _coefficients(stored) -> int:
-    """Number of a controller's coefficients."""
-    return stored["C_A"].shape[2] * stored["C_A"].shape[3] if "C_A" in stored else 0
+    """Number of the histories that only this controller has."""
+    return sum(int(np.prod(stored[name].shape[2:])) for name in _own(stored))
 
 
 def _signals(run, stride: int):
@@ -145,14 +155,20 @@ def _signals(run, stride: int):
     ]
     for name, panel, values in fast:
         yield _encoded(name, panel, values, stride)
-    if "C_A" in run:
-        coefficients = run["C_A"].values
-        for actuator in (0, 1):
-            for j in range(coefficients.shape[1]):
-                name = f"u{actuator + 1}: x{j // 4 + 1}{chr(39) * (j % 4)}"
-                yield _encoded(
-                    name, "coefficient [–]", coefficients[:, j, actuator], SLOWER * stride
-                )
+    for name in _own(run):
+        attrs, values = run[name].attrs, run[name].values
+        values = values.reshape(len(values), -1)
+        told = sorted(
+            zip(str(attrs.get("elements", "")).split("; "), values.T, strict=False),
+            key=lambda line: line[0],
+        )
+        if len(told) != values.shape[1]:
+            tails = [f" {i + 1}" for i in range(values.shape[1])] if values.shape[1] > 1 else [""]
+            told = [(name + tail, x) for tail, x in zip(tails, values.T, strict=True)]
+        unit, dims = str(attrs.get("units", "")), run[name].dims[1:]
+        panel = f"{dims[0] if dims else name} [{'–' if unit == '1' else unit}]" if unit else name
+        for line, history in told:
+            yield _encoded(line, panel, history, SLOWER * stride)
 
 
 def _encoded(name: str, panel: str, values: np.ndarray, stride: int) -> dict:

@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from martths_jax import published
+from martths_jax.campaign.dataset import index_names, unit_of
 from martths_jax.campaign.statistics import PERCENTS, percentile
 from martths_jax.errors import argument_error
 from martths_jax.figures.style import Names, index_label, motion_label
-from martths_jax.indices import DELAYS, NAMES
 from martths_jax.study.summary import Table, number
 from martths_jax.text import csv_cell
 
@@ -26,16 +26,11 @@ def study_tables(dataset: xr.Dataset) -> list[Table]:
     return [nominal_table(dataset), *(distribution_table(dataset, m) for m in motions)]
 
 
-def unit_of(index: str) -> str:
-    """Unit of an index."""
-    return "ms" if index in DELAYS else "%"
-
-
 def nominal_means(dataset: xr.Dataset) -> dict[str, dict[str, float]]:
     """Controller -> index -> mean over the motions, nominal plant (NaN if a run diverged)."""
     mean = dataset.value.sel(trial=0).mean("motion", skipna=False)
     return {
-        str(c): dict(zip(NAMES, mean.sel(controller=c).values.tolist(), strict=True))
+        str(c): dict(zip(index_names(dataset), mean.sel(controller=c).values.tolist(), strict=True))
         for c in dataset.controller.values
     }
 
@@ -50,8 +45,8 @@ def nominal_table(dataset: xr.Dataset) -> Table:
         known = name in published.COLUMNS
         heads += [f"{label}, paper", f"{label}, here", "deviation"] if known else [f"{label}, here"]
     rows = []
-    for index in NAMES:
-        cells = [f"{index} [{unit_of(index)}]", _printed(published.experiment(index))]
+    for index in index_names(dataset):
+        cells = [f"{index} [{unit_of(dataset, index)}]", _printed(published.experiment(index))]
         for name, found in means.items():
             value = found[index]
             if name not in published.COLUMNS:
@@ -83,14 +78,13 @@ def distribution_table(dataset: xr.Dataset, motion: str) -> Table:
     value = {c: dataset.value.sel(controller=c, motion=motion).values[1:] for c in names}
     rows = [
         (
-            f"{index} [{unit_of(index)}]",
+            f"{index} [{unit_of(dataset, index)}]",
             *(number(percentile(value[c][:, i], p).value) for c in names for p in PERCENTS),
         )
-        for i, index in enumerate(NAMES)
+        for i, index in enumerate(index_names(dataset))
     ]
     counts = ", ".join(
-        f"{called.label(c)} {int(np.isfinite(v[:, 0]).sum())} of {len(v)}"
-        for c, v in value.items()
+        f"{called.label(c)} {int(np.isfinite(v[:, 0]).sum())} of {len(v)}" for c, v in value.items()
     )
     note = f"Over the uncertain plants that finished: {counts}."
     return Table(f"{motion_label(motion)}: percentiles", tuple(heads), rows, (note,))
@@ -100,8 +94,8 @@ def tidy_rows(dataset: xr.Dataset) -> list[tuple]:
     """(table, motion, controller, index, unit, statistic, value) of every number, all digits."""
     rows = []
     for name, found in nominal_means(dataset).items():
-        for index in NAMES:
-            head = ("table4", "mean", name, index, unit_of(index))
+        for index in index_names(dataset):
+            head = ("table4", "mean", name, index, unit_of(dataset, index))
             rows.append((*head, "here", found[index]))
             paper = published.printed(index, name)
             if paper is not None:
@@ -109,10 +103,10 @@ def tidy_rows(dataset: xr.Dataset) -> list[tuple]:
     for motion in map(str, dataset.motion.values):
         for name in map(str, dataset.controller.values):
             cell = dataset.value.sel(controller=name, motion=motion).values[1:]
-            for i, index in enumerate(NAMES):
+            for i, index in enumerate(index_names(dataset)):
                 for p in PERCENTS:
                     found = percentile(cell[:, i], p)
-                    head = ("percentiles", motion, name, index, unit_of(index))
+                    head = ("percentiles", motion, name, index, unit_of(dataset, index))
                     rows.append((*head, f"P{p}", found.value))
                     rows.append((*head, f"P{p}_low", found.low))
                     rows.append((*head, f"P{p}_high", found.high))

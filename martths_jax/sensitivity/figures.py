@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.dataset import index_names
 from martths_jax.figures.style import (
     BLUE,
     DOUBLE,
@@ -18,7 +19,6 @@ from martths_jax.figures.style import (
     save,
 )
 from martths_jax.files import safe_name
-from martths_jax.indices import NAMES
 from martths_jax.sensitivity.estimators import LEVEL
 from martths_jax.sensitivity.results import Sensitivity, indices_of
 
@@ -41,6 +41,7 @@ def tornado(found: Sensitivity, controller: str, shown: Sequence[str]) -> Drawin
     """Total (light) and first-order (dark) indices of each factor, sorted, with intervals."""
     one = indices_of(found, controller)
     factors = [str(f) for f in found.dataset.factor.values]
+    names = index_names(found.dataset)
     across = min(3, len(shown))
     down = -(-len(shown) // across)
     figure = new_figure(DOUBLE, 58 * down + 10)
@@ -49,7 +50,7 @@ def tornado(found: Sensitivity, controller: str, shown: Sequence[str]) -> Drawin
              "first_high")  # fmt: skip
     columns: dict[str, list] = {head: [] for head in heads}
     for panel, name in zip(axes, shown, strict=False):
-        i = NAMES.index(name)
+        i = names.index(name)
         panel.set_title(index_label(name))
         panel.set_xlim(0, 1)
         if not one.varies[i]:

@@ -12,6 +12,7 @@ from martths_jax.campaign.assembly import write_results as write_files
 from martths_jax.campaign.dataset import (
     ACTUATORS,
     attributes,
+    index_names,
     outcome_variables,
     read_results,
 )
@@ -19,7 +20,6 @@ from martths_jax.campaign.plan import Plan
 from martths_jax.campaign.store import RunFolder
 from martths_jax.campaign.tables import Summary, Table
 from martths_jax.campaign.tidy import write_rows
-from martths_jax.indices import NAMES
 from martths_jax.sensitivity.design import Design
 from martths_jax.sensitivity.estimators import LEVEL, RESAMPLES, SobolIndices, sobol, verdicts
 from martths_jax.sensitivity.store import ROWS
@@ -107,12 +107,13 @@ def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
     names = list(plan.controllers)
     shape = design.unit.shape[:2]
     outcomes = [run.read(c, ROWS) for c in names]
+    identity = run.header["identity"]
 
     def gather(pick):
         return np.stack([x.reshape(*shape, *x.shape[1:]) for x in map(pick, outcomes)])
 
     found = [sobol(v, seed=plan.config.seed) for v in gather(lambda o: o.value)]
-    notes = [list(verdicts(NAMES, f, design.samples).values()) for f in found]
+    notes = [list(verdicts(identity["indices"], f, design.samples).values()) for f in found]
     cell = ("controller", "index", "factor")
     variables = {
         name: (cell, np.stack([getattr(f, name) for f in found]), {
@@ -128,10 +129,10 @@ def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
         "note": (cell[:2], np.array(notes), {"long_name": "what limits these indices"}),
         "point": (("sample", "row", "factor"), design.unit, {
             "long_name": "points of the design in the unit cube", "units": "1"}),
-    } | outcome_variables(("controller", "sample", "row"), gather)  # fmt: skip
+    } | outcome_variables(identity, ("controller", "sample", "row"), gather)  # fmt: skip
     coordinates = {
         "controller": np.array(names),
-        "index": np.array(NAMES),
+        "index": np.array(identity["indices"]),
         "factor": np.array(design.factors),
         "row": np.array(["A", "B", *(f"AB {f}" for f in design.factors)]),
         "sample": np.arange(design.samples, dtype=np.int32),
@@ -181,7 +182,7 @@ def summarise(found: Sensitivity) -> Summary:
         ):
             rows = [
                 (name, *(_cell(*x) for x in zip(value[i], low[i], high[i], strict=True)))
-                for i, name in enumerate(NAMES)
+                for i, name in enumerate(index_names(found.dataset))
             ]
             note = (
                 f"In brackets: {LEVEL:.0%} bootstrap confidence intervals, {one.used} of "
@@ -206,7 +207,7 @@ def leading(found: Sensitivity, controller: str, most: int = 3) -> Table:
     """For each index the factors with the largest total indices: a table for the screen."""
     one, rows = indices_of(found, controller), []
     factors = found.dataset.factor.values
-    for i, name in enumerate(NAMES):
+    for i, name in enumerate(index_names(found.dataset)):
         note = found.notes.get((controller, name), "")
         order = np.argsort(-one.total[i])[:most] if one.varies[i] else []
         cells = [

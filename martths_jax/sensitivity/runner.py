@@ -15,7 +15,8 @@ from martths_jax.campaign.plan import Plan, build_plan
 from martths_jax.campaign.progress import Reporter, Tally
 from martths_jax.campaign.run import run_campaign
 from martths_jax.errors import argument_error, raise_all
-from martths_jax.indices import NAMES
+from martths_jax.indices import choose
+from martths_jax.indices.table import shown_of
 from martths_jax.plant import check_plants
 from martths_jax.published import PROPOSED
 from martths_jax.runtime import check_runtime
@@ -64,8 +65,8 @@ def run_sensitivity(
             folder's files; what was finished stays.
     """
     check_runtime()
-    shown, reporter = tuple(dict.fromkeys(shown)), reporter or Reporter()
-    plan, design = build(config, shown, changes)
+    reporter = reporter or Reporter()
+    plan, design, shown = build(config, shown, changes)
     return run_campaign(
         Rows(plan, design, shown if figures else ()), reporter=reporter, fresh=fresh,
         allow_mixed=allow_mixed, command_line=command_line,
@@ -164,14 +165,16 @@ class OneController(Batch):
                 yield Block((self.controller, motion.name), lanes, run)
 
 
-def build(config, shown: tuple[str, ...], changes: dict) -> tuple[Plan, Design]:
-    """Everything the rows run with, built and checked."""
+def build(config, shown: Iterable[str], changes: dict) -> tuple[Plan, Design, tuple[str, ...]]:
+    """Everything the rows run with, built and checked; and what is shown."""
     if isinstance(config, (str, Path)):
         config = read_toml(Path(config))
     if not isinstance(config, StudyConfig):
         config = DEFAULTS | dict(config or {})
     study = make_config(config, **changes)
-    problems = unknown_names([n for n in shown if n not in NAMES], set(NAMES), "Index")
+    names = [index.name for index in choose(study.indices)]
+    shown = shown_of(shown, SHOWN, names)
+    problems = unknown_names([n for n in shown if n not in names], names, "Index")
     if not is_power_of_two(study.trials):
         near = 2 ** max(1, round(np.log2(max(study.trials, 2))))
         problems.append(
@@ -194,4 +197,4 @@ def build(config, shown: tuple[str, ...], changes: dict) -> tuple[Plan, Design]:
     plan = build_plan(study)
     design = make_design(study.trials, len(plan.motions), study.seed)
     check_plants(design.plants(np.arange(design.rows), study.spread))
-    return plan, design
+    return plan, design, shown

@@ -16,39 +16,31 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from martths_jax.campaign.dataset import read_dataset, write_dataset
+from martths_jax.campaign.dataset import index_names, read_dataset, write_dataset
 from martths_jax.campaign.engine import Engine
 from martths_jax.campaign.files import writing
 from martths_jax.campaign.store import FORMAT
+from martths_jax.control.base import Signal
 from martths_jax.errors import InputError
 from martths_jax.files import safe_name
-from martths_jax.indices import NAMES
+from martths_jax.signals import REFERENCE, declared
 from martths_jax.simulation import FEW
 from martths_jax.watch import Status
 
-#: The index that ranks trials.
+#: The index that ranks trials; the first one of a study that has it not.
 RANKED_BY = "J2_1"
-#: Dimensions and units of the signals, after (kept, time).
-LAYOUT = {
-    "x_a": (("actuator",), "mm", "target strokes"),
-    "x_m": (("actuator",), "mm", "measured strokes"),
-    "x_hat": (("actuator",), "mm", "estimated strokes"),
-    "u": (("actuator",), "mm", "commands"),
-    "num": (("dof",), "m, rad", "numerical interface and storey motion"),
-    "est": (("interface_dof",), "m, rad", "estimated interface motion"),
-    "force": (("interface_force",), "N, N m", "restoring force"),
-    "C_A": (("coefficient", "actuator"), "1", "adaptive coefficients in scaled derivatives"),
-}
 
 
 def choose_trials(dataset: xr.Dataset, controller: str, motion: str, keep) -> dict[int, str]:
     """Trials whose signals are stored, and in what role.
 
-    Median and worst are by ``J2_1`` among the uncertain trials that finished; the first that
-    diverged, if any, is stored as ``failed``.
+    Median and worst are by the magnitude of ``RANKED_BY`` among the uncertain trials that finished;
+    the first that diverged, if any, is stored as ``failed``.
     """
     cell = dataset.sel(controller=controller, motion=motion)
-    score = cell.value.values[1:, NAMES.index(RANKED_BY)]
+    names = index_names(dataset)
+    by = names.index(RANKED_BY) if RANKED_BY in names else 0
+    score = np.abs(cell.value.values[1:, by])
     roles: dict[int, list[str]] = {0: ["nominal"]}
     finished = np.flatnonzero(np.isfinite(score))
     if finished.size:
@@ -132,8 +124,8 @@ def _shared(engine: Engine, motion: str) -> xr.Dataset:
     return xr.Dataset(
         {
             "ground": ("time", ground, {"units": "m s-2", "long_name": "ground acceleration"}),
-            "reference": (("time", "dof"), np.asarray(setup.reference), {
-                "units": "m, rad", "long_name": "response of the reference structure"}),
+            "reference": (("time", *REFERENCE.dims), np.asarray(setup.reference), {
+                "units": REFERENCE.unit, "long_name": REFERENCE.label}),
         },
         {
             "time": ("time", np.arange(ground.size) / engine.plan.benchmark.fs, {"units": "s"}),
@@ -142,20 +134,29 @@ def _shared(engine: Engine, motion: str) -> xr.Dataset:
     )  # fmt: skip
 
 
+def stored_signal(signal: Signal | None, name: str, values: np.ndarray) -> tuple:
+    """A variable of (kept, time, ...) values, with what is declared of the signal, if anything."""
+    if signal is None:
+        dims = tuple(f"{name}_{i}" for i in range(values.ndim - 2))
+        return ("kept", "time", *dims), values, {"long_name": name}
+    attrs = {"units": signal.unit, "long_name": signal.label or name}
+    if signal.elements:
+        attrs["elements"] = "; ".join(signal.elements)
+    if signal.count:
+        attrs["count"] = "what it counted by then"
+    return ("kept", "time", *signal.dims), values, attrs
+
+
 def _run(engine: Engine, controller: str, motion: str, roles: dict, device) -> xr.Dataset:
     trials = np.array(list(roles))
     batches = [
         engine.signals(controller, motion, trials[i : i + FEW], device)
         for i in range(0, trials.size, FEW)
     ]
-    variables = {}
+    variables, told = {}, declared(engine.setup(controller, motion).controller)
     for name in batches[0]:
         values = np.concatenate([np.asarray(b[name]) for b in batches])
-        extra, unit, meaning = LAYOUT.get(
-            name, (tuple(f"{name}_{i}" for i in range(values.ndim - 2)), "", name)
-        )
-        attrs = {"units": unit, "long_name": meaning} if unit else {"long_name": meaning}
-        variables[name] = (("kept", "time", *extra), values, attrs)
+        variables[name] = stored_signal(told.get(name), name, values)
     variables["role"] = ("kept", np.array(list(roles.values())))
     variables["trial"] = ("kept", trials.astype(np.int32))
     return xr.Dataset(variables)

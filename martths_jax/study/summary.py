@@ -6,10 +6,9 @@ import numpy as np
 import xarray as xr
 
 from martths_jax import published
-from martths_jax.campaign.dataset import controllers_of
+from martths_jax.campaign.dataset import controllers_of, index_names, unit_of
 from martths_jax.campaign.statistics import LEVEL, PERCENTS, Estimate, compare, percentile
 from martths_jax.campaign.tables import Summary, Table, extent, number
-from martths_jax.indices import NAMES
 from martths_jax.text import counted
 from martths_jax.watch import Status
 
@@ -68,9 +67,9 @@ def _ends(dataset, cells) -> Table:
 def _percentiles(dataset, controller: str, motion: str) -> Table:
     value = dataset.value.sel(controller=controller, motion=motion).values
     rows = []
-    for i, name in enumerate(NAMES):
+    for i, name in enumerate(index_names(dataset)):
         found = [percentile(value[1:, i], p) for p in PERCENTS]
-        unit = "ms" if name.startswith(("J1_", "J4_")) else "%"
+        unit = unit_of(dataset, name)
         rows.append((
             f"{name} [{unit}]", *map(with_interval, found), str(found[0].trials),
             number(value[0, i]),
@@ -85,7 +84,7 @@ def _percentiles(dataset, controller: str, motion: str) -> Table:
 def _paired(dataset, motion: str, pair: tuple[str, str]) -> Table:
     first, second = (dataset.value.sel(controller=c, motion=motion).values[1:] for c in pair)
     rows = []
-    for i, name in enumerate(NAMES):
+    for i, name in enumerate(index_names(dataset)):
         found = compare(first[:, i], second[:, i])
         rows.append((
             name, with_interval(found.difference),
@@ -109,7 +108,7 @@ def _nominal(dataset) -> Table:
             pick.append(lambda name, c=controller: published.printed(name, c))
         heads.append(f"{controller}, here")
         pick.append(lambda name, c=controller: float(mean.sel(controller=c, index=name)))
-    rows = [(name, *(_or_dash(get(name)) for get in pick)) for name in NAMES]
+    rows = [(name, *(_or_dash(get(name)) for get in pick)) for name in index_names(dataset)]
     motions = ", ".join(dataset.motion.values)
     note = (
         f"Nominal plant (trial 0, one noise draw), mean over {motions}; Table 4 is over the "

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.dataset import unit_of
 from martths_jax.campaign.statistics import LEVEL, percentile, proportion
 from martths_jax.figures.style import (
     DOUBLE,
@@ -21,7 +22,6 @@ from martths_jax.figures.style import (
     save,
 )
 from martths_jax.files import safe_name
-from martths_jax.indices import DELAYS
 from martths_jax.sweep.axes import Axis
 from martths_jax.sweep.results import Sweep
 from martths_jax.watch import Status
@@ -108,7 +108,7 @@ def heat_map(
             for y, x in np.ndindex(values.shape):
                 _overprint(axis, x, y, lost[y, x], picture.norm, values[y, x])
             bar = figure.colorbar(picture, ax=axis, location="top", pad=0.02, aspect=14)
-            unit = "ms" if name in DELAYS else "%"
+            unit = unit_of(sweep.dataset, name)
             bar.set_label(f"{_WORDS[percent]} {index_label(name)} [{unit}]", fontsize=6.5)
             _plain_ticks(bar, picture.norm)
         for y, x in np.ndindex(lost.shape):
@@ -225,8 +225,10 @@ def lines(sweep: Sweep, axis: Axis, motion: str, shown: Sequence[str]) -> Drawin
         for value, e in zip(axis.values, shares, strict=True):
             add(controller, "lost", "", value, e.value, e.low, e.high, e.trials)
     for panel, name in zip(axes, [*shown, "lost"], strict=False):
-        unit = "ms" if name in DELAYS else "%"
-        panel.set_ylabel("lost trials [%]" if name == "lost" else f"{index_label(name)} [{unit}]")
+        label = "lost trials [%]"
+        if name != "lost":
+            label = f"{index_label(name)} [{unit_of(sweep.dataset, name)}]"
+        panel.set_ylabel(label)
         panel.set_xlabel(_axis_label(axis))
         if _is_logarithmic(values):
             panel.set_xscale("log")

@@ -14,6 +14,7 @@ from martths_jax.campaign.assembly import write_results as write_files
 from martths_jax.campaign.dataset import (
     ACTUATORS,
     attributes,
+    index_names,
     outcome_variables,
     read_results,
 )
@@ -21,7 +22,7 @@ from martths_jax.campaign.statistics import percentile
 from martths_jax.campaign.store import RunFolder
 from martths_jax.campaign.tables import Summary, Table, extent, number
 from martths_jax.campaign.tidy import write_runs
-from martths_jax.indices import NAMES
+from martths_jax.indices.table import shown_of
 from martths_jax.plant import PARAMETERS
 from martths_jax.sweep.axes import Axis, Scalar
 from martths_jax.sweep.config import SHOWN, SweepConfig
@@ -75,7 +76,7 @@ class Sweep(Results):
 
     def summary(self, shown: Iterable[str] = SHOWN) -> Summary:
         """Median and P95 of chosen indices and lost trials, cell by cell."""
-        return summarise(self, tuple(shown))
+        return summarise(self, shown_of(shown, SHOWN, index_names(self.dataset)))
 
     def __str__(self) -> str:
         sizes = " x ".join(f"{axis.name} {len(axis.values)}" for axis in self.axes)
@@ -127,7 +128,8 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         return values.reshape(*grid.shape, *values.shape[1:])
 
     cell = (*names, "controller", "motion", "trial")
-    variables = outcome_variables(cell, gather)
+    identity = run.header["identity"]
+    variables = outcome_variables(identity, cell, gather)
     variables["draw"] = (("trial", "parameter"), run.draws().plants(
         np.arange(run.trials + 1)).draws, {
             "long_name": "standard normal draws of the plant, before any spread", "units": "1"},
@@ -144,23 +146,24 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         "controller": np.array(list(grid.jobs)),
         "motion": np.array(motions),
         "trial": np.arange(run.trials + 1, dtype=np.int32),
-        "index": np.array(NAMES),
+        "index": np.array(identity["indices"]),
         "actuator": ACTUATORS,
         "parameter": np.array(PARAMETERS),
     }  # fmt: skip
     about = attributes(run) | {
         "title": "Virtual multi-axial real-time hybrid simulation: sweep",
         "axes": json.dumps(run.header["identity"]["axes"]),
+        "counts": json.dumps(list(identity["counts"])),
     }
     return xr.Dataset(variables, coordinates, about)
 
 
 def write_csv(dataset: xr.Dataset, path: Path) -> None:
-    """One row a cell, controller, motion and trial: axes, status, fits not used, indices.
+    """One row a cell, controller, motion and trial: axes, status, counts, indices.
 
     Numbers have all their digits; an index of a trial that diverged is empty.
     """
-    write_runs(dataset, path, before=["held"])
+    write_runs(dataset, path, before=list(json.loads(dataset.attrs["counts"])))
 
 
 def summarise(sweep: Sweep, shown: tuple[str, ...]) -> Summary:

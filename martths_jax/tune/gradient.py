@@ -20,7 +20,7 @@ from martths_jax.motions import Motion
 from martths_jax.plant import Plants
 from martths_jax.runtime import check_runtime, compiler_options
 from martths_jax.sensors import SensorNoise
-from martths_jax.simulation import draw_noise, lag_range, reference_response
+from martths_jax.simulation import draw_noise, reference_response
 from martths_jax.tune.objective import Objective
 from martths_jax.tune.parameters import Tuned, tuned
 from martths_jax.watch import Status
@@ -80,13 +80,13 @@ class Gradient:
         fs = benchmark.fs
         trials = len(plants)
         devices = jax.local_devices()[: math.gcd(trials, jax.local_device_count())]
-        lags = lag_range(0, fs) if objective.needs_delays else (1, 1)
+        observers = objective.observers(fs)
 
         forward = self.mode == "forward"
 
         def value(moving, still, weights, plants, ground, reference, noise):
             ready = controller.build(benchmark, {**still, **moving})
-            sums, watch, _, peaks = loop.run(
+            states, _ = loop.run(
                 benchmark,
                 ready,
                 plants.discretise(benchmark.dt),
@@ -94,12 +94,11 @@ class Gradient:
                 reference,
                 noise,
                 trials=plants.draws.shape[0],
-                lags=lags,
+                observers=observers,
                 segment=0 if forward else segment_length(ground.shape[0], loop.window_of(ready)),
-                tally=objective.tally,
             )
-            loss, smooth = objective.evaluate(sums, watch, peaks, weights)
-            lost = watching.status_of(watch) >= Status.DIVERGED
+            loss, smooth = objective.evaluate(observers, states, weights)
+            lost = watching.status_of(states[-1]) >= Status.DIVERGED
             means = jax.tree.map(jnp.mean, smooth), jnp.mean(lost.astype(float))
             return jnp.mean(loss), (jnp.mean(loss), means)
 

@@ -1,6 +1,6 @@
 """What tuning minimises: a weighted sum of indices, each in a form that has a useful gradient.
 
-RMS indices (J2, J5, J7, J8) are smooth as they are.  Two kinds are replaced:
+RMS indices (J2, J5, J7, J8) are smooth as they are.  Two kinds are replaced (``Kind.smooth``):
 
 * delays J1, J4, which are whole samples, by the vertex of the parabola through the largest
   cross-correlation and its neighbours;
@@ -13,43 +13,17 @@ The final numbers of a tuning are always the true indices.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import jax
 import jax.numpy as jnp
 
 from martths_jax.benchmark import VOLT_LIMIT
 from martths_jax.errors import argument_error
-from martths_jax.indices import DELAYS, NAMES, PAIRS, IndexSums, indices_of, pairs
-from martths_jax.watch import Watch
-
-DOUBLINGS_OF_POWER = 4
-POWER = 2**DOUBLINGS_OF_POWER
-PEAKS = tuple(peak for _, peak in PAIRS)
-
-
-class PeakTally:
-    """Sums of |error|^p and |target|^p of the ten pairs, (10, T) each, for ``loop.run``."""
-
-    def init(self, trials: int):
-        """Empty sums."""
-        return (jnp.zeros((len(PAIRS), trials)),) * 2
-
-    def add(self, sums, signals, reference, valid):
-        """Add a sample; arguments as ``indices.pairs`` takes them, and whether it counts."""
-        found = pairs(signals, reference)
-        error = jnp.concatenate([value - target for value, target in found])
-        target = jnp.concatenate([target for _, target in found])
-        return tuple(
-            total + _power(jnp.where(valid, x, 0.0))
-            for total, x in zip(sums, (error, target), strict=True)
-        )
-
-
-def _power(x):
-    for _ in range(DOUBLINGS_OF_POWER):
-        x = x * x
-    return x
+from martths_jax.indices import KNOWN, Index, IndexSums, indices_of, observers_of
+from martths_jax.observers import Observer
+from martths_jax.watch import Watcher
 
 
 @dataclass(frozen=True)
@@ -79,13 +53,17 @@ class Objective:
         for part in text.split("+"):
             match = re.fullmatch(r"\s*(?:([^*\s]+)\s*\*)?\s*([A-Za-z0-9_]+)\s*", part)
             named = match and match[2].upper()
-            group = [n for n in NAMES if n == named or n.split("_")[0] == named]
+            word = (named or "").casefold()
+            group = [
+                i.name for i in KNOWN.values() if word in (i.name.casefold(), i.group.casefold())
+            ]
             if not group:
                 raise argument_error(
                     "objective",
                     "be a sum of weighted indices such as j2+0.5*j5",
                     repr(part.strip()),
-                    "The groups are J1 to J10, the indices " + ", ".join(NAMES) + ".",
+                    f"The groups are {', '.join(dict.fromkeys(i.group for i in KNOWN.values()))}; "
+                    f"the indices {', '.join(KNOWN)}.",
                 )
             weight = _positive("objective", match[1] or "1", f"have a positive weight on {named}")
             terms += [(weight / len(group), name) for name in group]
@@ -110,31 +88,28 @@ class Objective:
         """What a compiled program of it depends on: everything but the weights."""
         return self.names, self.volt_limit, self.penalty
 
-    @property
-    def tally(self) -> PeakTally | None:
-        """The running sums it needs besides those of every run."""
-        return PeakTally() if set(self.names) & set(PEAKS) else None
+    @cached_property
+    def smooth(self) -> tuple[Index, ...]:
+        """The indices that count, of kinds that have a useful gradient."""
+        return tuple(replace(KNOWN[name], kind=KNOWN[name].kind.smooth()) for name in self.names)
 
-    @property
-    def needs_delays(self) -> bool:
-        """Whether cross-correlations are needed."""
-        return bool(set(self.names) & set(DELAYS))
+    def observers(self, fs: float) -> tuple[Observer, ...]:
+        """What has to look at a run at a sampling rate [Hz]."""
+        return (*observers_of(self.smooth, fs), Watcher())
 
     def evaluate(
-        self, sums: IndexSums, watch: Watch, peaks, weights: jax.Array | None = None
+        self, observers: tuple[Observer, ...], states, weights: jax.Array | None = None
     ) -> tuple[jax.Array, dict]:
         """Smooth objective of each trial (T,) and the smooth indices it is made of (T,).
 
         Args:
-            sums, watch, peaks: of ``loop.run`` with ``tally``.
+            observers, states: what looked at a run (``observers``), and what ``loop.run`` says of
+                it.
             weights: in place of ``self.weights``; may be traced.
         """
         weights = self.weights if weights is None else weights
-        smooth = indices_of(sums, interpolate=True)
-        if peaks is not None:
-            error, target = (jnp.maximum(x, 1e-300) ** (1 / POWER) for x in peaks)
-            smooth |= dict(zip(PEAKS, 100 * error / target, strict=True))
-        smooth = {name: smooth[name] for name in self.names}
+        *sums, watch = states
+        smooth = indices_of(IndexSums(tuple(sums), observers[:-1], self.smooth))
         over = jnp.maximum(watch.volt_peak - self.volt_limit, 0.0)
         loss = sum(w * jnp.abs(smooth[name]) for w, name in zip(weights, self.names, strict=True))
         return loss + self.penalty * jnp.sum(over**2, axis=0), smooth

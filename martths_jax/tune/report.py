@@ -12,7 +12,7 @@ from martths_jax import published
 from martths_jax.benchmark import Benchmark
 from martths_jax.campaign.files import write_text
 from martths_jax.files import atomic
-from martths_jax.indices import NAMES, indices
+from martths_jax.indices import indices
 from martths_jax.motions import Motion
 from martths_jax.plant import draw_plants
 from martths_jax.published import TABLE4
@@ -72,7 +72,7 @@ def compare(
         found = indices(result)
         kept = ~result.lost
         medians[name] = {
-            n: float(np.median(found[n][kept])) if kept.any() else np.nan for n in NAMES
+            n: float(np.median(found[n][kept])) if kept.any() else np.nan for n in found
         }
         medians[name]["diverged [%]"] = 100 * float(np.mean(result.lost))
         medians[name]["largest volts"] = float(np.max(result.watch.volt_peak))

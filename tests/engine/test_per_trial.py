@@ -6,8 +6,8 @@ import jax
 import numpy as np
 import pytest
 
-from martths_jax import ADFC, LQG, draw_plants, indices, simulate, simulation
-from martths_jax.indices import NAMES
+from martths_jax import ADFC, LQG, draw_plants, indices, simulate
+from martths_jax.indices import NAMES, delay
 from martths_jax.simulation import LANES
 from tests.engine.motions import burst
 
@@ -55,7 +55,7 @@ def lqg_pair(benchmark, trials):
 def test_every_documented_array_over_the_trials(benchmark, monkeypatch, pair):
     """More trials than a device's block holds, so that the last block is hardly filled."""
     trials = LANES + 6
-    monkeypatch.setattr(simulation, "LAG_RANGES", ((32, 96),) * 3)  # one program
+    monkeypatch.setattr(delay, "RANGES", ((32, 96),) * 3)  # one program
     several, alone = pair(benchmark, trials)
     plants = draw_plants(trials, 4)
     together = indices(simulate(benchmark, several, plants, MOTION))

@@ -22,10 +22,9 @@ from martths_jax import (
 from martths_jax.indices import (
     DELAYS,
     NAMES,
-    PAIRS,
-    IndexSums,
+    Delay,
+    Rms,
     correlate,
-    delay_ms,
     trials_first,
     trials_last,
 )
@@ -45,8 +44,9 @@ def test_trials_are_the_first_axis_of_every_array(result):
     first = {jax.tree_util.keystr(path): leaf.shape[0] for path, leaf in leaves}
     assert first.pop(".reference") == MOTION.acceleration.size
     assert set(first.values()) == {5}
-    assert result.watch.saturated.shape == (5, 2) and result.sums.error_square.shape == (5, 10)
-    assert result.sums.correlation.shape[::2] == (5, 4)
+    assert result.watch.saturated.shape == (5, 2)
+    assert result.sums.of(Rms)["error_square"].shape == (5, 10)
+    assert result.sums.of(Delay)["correlation"].shape[::2] == (5, 4)
     one = jax.tree.map(lambda x: x[3:4], result)
     assert indices(one)["J2_1"] == indices(result)["J2_1"][3]
 
@@ -152,7 +152,7 @@ def test_the_interpolated_delay_of_a_known_one():
     wave = lambda t: np.sin(2 * np.pi * t / 97) * np.exp(-(((t - n / 2) / 600) ** 2))  # noqa: E731
     r = correlate(jnp.asarray(wave(t[lags[1] : lags[1] + n] - 3.3))[:, None],
                   jnp.asarray(wave(t))[:, None], lags)  # fmt: skip
-    blank = np.zeros((len(PAIRS), 1))
-    sums = IndexSums(blank, blank, blank, blank, np.asarray(r)[:, None].repeat(4, 1), lags, 1000.0)
-    np.testing.assert_allclose(delay_ms(sums, True), 3.3, atol=2e-3)
-    np.testing.assert_array_equal(delay_ms(sums, False), 3.0)
+    state = {"correlation": np.asarray(r)[:, None], "target_square": np.ones((1, 1))}
+    delay = Delay(fs=1000.0, lags=lags)
+    np.testing.assert_allclose(delay.interpolated().result(state)[""][0], 3.3, atol=2e-3)
+    np.testing.assert_array_equal(delay.result(state)[""][0], 3.0)

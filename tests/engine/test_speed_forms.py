@@ -8,18 +8,18 @@ import pytest
 from martths_jax import (
     ADFC,
     Passthrough,
+    blocks,
     build_coupler,
     draw_plants,
     indices,
     loop,
     simulate,
-    simulation,
 )
 from martths_jax.algebra import least_squares as ls
 from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES, TAPS, BackwardDifferences
 from martths_jax.control.adaptive.window import Window
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
-from martths_jax.indices import NAMES, correlate
+from martths_jax.indices import NAMES, correlate, delay
 from tests.engine.motions import burst
 
 #: Buffer and motion of other tests of this folder too, so that all use one compiled program.
@@ -159,12 +159,12 @@ def test_pieces_of_a_window_change_only_round_off(benchmark, monkeypatch):
 
     def outcome(piece):
         monkeypatch.setattr(loop, "PIECE", piece)
-        simulation.compiled.cache_clear()
+        blocks.compiled.cache_clear()
         sums = simulate(benchmark, controller, plants, MOTION).sums
         return [np.asarray(x) for x in (sums.correlation, sums.error_square, sums.error_peak)]
 
     whole, pieces = outcome(192), outcome(64)
-    simulation.compiled.cache_clear()
+    blocks.compiled.cache_clear()
     for a, b in zip(whole, pieces, strict=True):
         np.testing.assert_allclose(b, a, rtol=1e-11)
 
@@ -209,13 +209,13 @@ def test_a_widened_lag_range_leaves_the_bits(benchmark, monkeypatch):
     """The same trials with a first range that holds their delays, and with one that does not."""
     plants, first = draw_plants(3, 4), Passthrough().first_lag_range
     usual = simulate(benchmark, Passthrough(), plants, MOTION)
-    assert usual.sums.lags == simulation.LAG_RANGES[first] == (32, 96)
+    assert usual.sums.observers[0].lags == delay.RANGES[first] == (32, 96)
     narrow = ((2, 2),) * (first + 1)
-    monkeypatch.setattr(simulation, "LAG_RANGES", (*narrow, (40, 100)))
+    monkeypatch.setattr(delay, "RANGES", (*narrow, (40, 100)))
     widened = simulate(benchmark, Passthrough(), plants, MOTION)
-    assert widened.sums.lags == (40, 100)
+    assert widened.sums.observers[0].lags == (40, 100)
     found, expected = indices(widened), indices(usual)
     for name in NAMES:
         np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
-    correlation = widened.sums.correlation[:, 8:-4]
-    np.testing.assert_allclose(correlation, usual.sums.correlation, rtol=0, atol=1e-9)
+    wide, narrow = (x.sums.of(delay.Delay)["correlation"] for x in (widened, usual))
+    np.testing.assert_allclose(wide[:, 8:-4], narrow, rtol=0, atol=1e-9)

@@ -14,16 +14,17 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from martths_jax import Motion
+from martths_jax import ADFC, Motion
 from martths_jax.campaign.dataset import read_dataset, write_dataset
 from martths_jax.campaign.engine import Outcome
 from martths_jax.campaign.plan import build_plan
 from martths_jax.campaign.session import header
 from martths_jax.campaign.store import FORMAT, RunFolder
 from martths_jax.indices import DELAYS, NAMES
+from martths_jax.signals import SIGNALS
 from martths_jax.study import make_config
 from martths_jax.study.runner import write_results
-from martths_jax.study.signals import LAYOUT, choose_trials, group
+from martths_jax.study.signals import choose_trials, group, stored_signal
 from martths_jax.watch import Status
 from tests.engine.motions import burst
 
@@ -69,9 +70,9 @@ def outcome(cell: int) -> Outcome:
         "status": status,
         "first": np.full((TRIALS + 1, 4, 2), np.nan),
         "volt_peak": np.ones((TRIALS + 1, 2)),
-        "held": np.zeros(TRIALS + 1, dtype=np.int32),
+        "counts": {"held": np.zeros(TRIALS + 1, dtype=np.int32)},
     }
-    return Outcome(**{name: arrays[name] for name in Outcome.__dataclass_fields__})
+    return Outcome(**arrays, names=NAMES)
 
 
 def shared() -> xr.Dataset:
@@ -104,7 +105,8 @@ def signals(roles: dict[int, str], controller: str) -> xr.Dataset:
     if controller == "adfc":
         numbers = 10 * np.arange(8)[:, None] + np.arange(2)
         arrays["C_A"] = np.broadcast_to(numbers, (kept, SAMPLES, 8, 2)).astype(float)
-    variables = {name: (("kept", "time", *LAYOUT[name][0]), a) for name, a in arrays.items()}
+    told = {signal.name: signal for signal in (*SIGNALS, *ADFC.signals)}
+    variables = {name: stored_signal(told[name], name, a) for name, a in arrays.items()}
     variables["role"] = ("kept", np.array(list(roles.values())))
     variables["trial"] = ("kept", np.array(list(roles), dtype=np.int32))
     return xr.Dataset(variables)

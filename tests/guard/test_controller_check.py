@@ -15,6 +15,7 @@ from martths_jax import (
     Decision,
     InputError,
     Passthrough,
+    blocks,
     draw_plants,
     nominal_plant,
     simulate,
@@ -143,7 +144,7 @@ def test_a_broken_rule_is_one_sentence(name, benchmark):
 
 
 def test_it_is_said_before_anything_is_compiled(benchmark, monkeypatch):
-    monkeypatch.setattr(simulation, "compiled", lambda *given: pytest.fail("was to be compiled"))
+    monkeypatch.setattr(blocks, "compiled", lambda *given: pytest.fail("was to be compiled"))
     for controller in (deciding(lambda x: Decision(x[0])), [deciding(lambda x: Decision(x[0]))]):
         with pytest.raises(InputError, match="give a command of shape"):
             simulate(benchmark, controller, nominal_plant(), burst(0.3))

@@ -79,16 +79,17 @@ def test_a_singular_fit_keeps_the_last_good_coefficients(benchmark):
     literal = ADFC(nb=NB, no=NB - 4, pull=0.0, start=start)
     result = simulate(benchmark, literal, nominal_plant(), still, quiet, keep=True)
     due = len(range(NB + 4, 300, 4))
-    assert result.watch.held.tolist() == [due]
+    assert result.counts["held"].tolist() == [due]
     assert np.all(result.signals["C_A"] == start)
     # Nothing moves: the delays and all that is measured on a target have no value.
     assert result.status[0] == Status.UNDEFINED
     assert all(np.isnan(value[0]) for value in indices(result).values())
-    assert result.describe(0).endswith(f"since the target does not move; {due} fits not used")
+    told = "fits that the controller did not use"
+    assert result.describe(0).endswith(f"since the target does not move; {told}: {due}")
 
     pulled = replace(literal, pull=1e-5, towards="inverse")
     result = simulate(benchmark, pulled, nominal_plant(), still, quiet, keep=True)
-    assert result.watch.held.tolist() == [0]
+    assert result.counts["held"].tolist() == [0]
     anchor = nominal_inverse(benchmark.plant_model, benchmark.fs, BACKWARD_DIFFERENCES)
     np.testing.assert_allclose(result.signals["C_A"][0, -1], anchor, rtol=1e-12)
 
@@ -98,12 +99,12 @@ def test_a_fit_beyond_the_condition_limit_is_held(benchmark, monkeypatch):
     shaken = Motion("shaken", np.sin(np.arange(400.0) / 20), 1024.0)
     controller = ADFC(nb=80, no=79, pull=1e-6)
     free = simulate(benchmark, controller, nominal_plant(), shaken, keep=True)
-    assert free.watch.held.tolist() == [0]
+    assert free.counts["held"].tolist() == [0]
     monkeypatch.setattr(adfc, "CONDITION_LIMIT", 1.0)
     simulation.compiled.cache_clear()
     held = simulate(benchmark, controller, nominal_plant(), shaken, keep=True)
     simulation.compiled.cache_clear()
-    assert held.watch.held.tolist() == [len(range(80 + 4, 400))]
+    assert held.counts["held"].tolist() == [len(range(80 + 4, 400))]
     assert np.all(held.signals["C_A"] == adfc.FOLLOW_TARGET)
     assert not np.allclose(free.signals["C_A"][0, -1], adfc.FOLLOW_TARGET)
 
@@ -163,11 +164,12 @@ def test_a_stroke_that_is_not_finite_at_once(benchmark):
     """A broken sensor: no range was left before, so the status says what it is."""
     from martths_jax import watch
 
-    seen = watch.init(1)
+    watcher = watch.Watcher()
+    seen = watcher.init(1)
     good = {"u": jnp.ones((2, 1)), "x_m": jnp.ones((2, 1))}
     broken = good | {"x_m": jnp.array([[1.0], [jnp.inf]])}
     for k, signals in enumerate((good, broken, good)):
-        seen = watch.update(seen, jnp.asarray(k), jnp.asarray(True), signals)
+        seen = watcher.add(seen, signals, None, jnp.asarray(k), jnp.asarray(True))
     sums = simulate(benchmark, Passthrough(), nominal_plant(), burst(0.3)).sums
     sums = trials_last(sums)
     assert watch.status_of(seen, sums).tolist() == [Status.NONFINITE]

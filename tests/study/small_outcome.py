@@ -13,6 +13,7 @@ def outcome(trials: int, seed: int = 0, **changes) -> Outcome:
         "status": np.zeros(trials, dtype=np.int32),
         "first": np.full((trials, 4, 2), np.nan),
         "volt_peak": np.ones((trials, 2)),
-        "held": np.zeros(trials, dtype=np.int32),
+        "counts": {"held": np.zeros(trials, dtype=np.int32)},
+        "names": NAMES,
     }
     return Outcome(**columns | changes)

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from martths_jax import InputError
+from martths_jax.indices import KNOWN, Norm
+from martths_jax.indices.norm import POWER
 from martths_jax.tune import Objective, Options
 from martths_jax.tune.gradient import segment_length
-from martths_jax.tune.objective import POWER, PeakTally
 
 
 def test_a_group_is_the_mean_of_its_indices():
@@ -38,7 +39,7 @@ def test_bad_options_are_one_sentence(changes, words):
         options.check()
 
 
-def test_peak_tally_is_the_p_norm_over_valid_samples():
+def test_peaks_stand_in_by_the_p_norm_over_valid_samples():
     rng = np.random.default_rng(0)
     signals = {
         "x_a": rng.normal(size=(50, 2, 1)),
@@ -46,19 +47,22 @@ def test_peak_tally_is_the_p_norm_over_valid_samples():
         "num": rng.normal(size=(50, 6, 1)),
         "est": rng.normal(size=(50, 2, 1)),
     }
-    tally, reference = PeakTally(), rng.normal(size=(50, 6, 1))
-    sums = tally.init(1)
+    reference = rng.normal(size=(50, 6, 1))
+    objective = Objective.parse("j3 + J10_27")
+    assert {index.kind for index in objective.smooth} == {KNOWN["J3_1"].kind.smooth()} == {Norm()}
+    norm, _ = objective.observers(1024.0)
+    sums = norm.init(1)
     for k in range(50):
         now = {name: jnp.asarray(x[k]) for name, x in signals.items()}
-        sums = tally.add(sums, now, jnp.asarray(reference[k]), k < 40)
-    error = np.abs(signals["x_m"] - signals["x_a"])[:40, 1, 0]
-    assert float(sums[0][1, 0]) ** (1 / POWER) == pytest.approx(
-        np.linalg.norm(error, POWER), rel=1e-12
-    )
-    target = np.abs(reference[:40, 5, 0])
-    assert float(sums[1][9, 0]) ** (1 / POWER) == pytest.approx(
-        np.linalg.norm(target, POWER), rel=1e-12
-    )
+        sums = norm.add(sums, now, jnp.asarray(reference[k]), jnp.asarray(k), k < 40)
+    value, missing = norm.result(norm.finish(sums))[""]
+    assert not np.any(missing)
+    x_a, x_m, num = (signals[name][:40, :, 0] for name in ("x_a", "x_m", "num"))
+    target = reference[:40, 5, 0]
+    for row, (y, x) in enumerate(((x_m[:, 0], x_a[:, 0]), (x_m[:, 1], x_a[:, 1]),
+                                  (num[:, 5], target))):  # fmt: skip
+        exact = 100 * np.linalg.norm(y - x, POWER) / np.linalg.norm(x, POWER)
+        assert float(value[row, 0]) == pytest.approx(exact, rel=1e-12)
 
 
 def test_segments_divide_the_window_and_grow_like_the_root():

@@ -55,6 +55,8 @@ def test_gradient_through_checkpointed_segments(benchmark, motion, kind):
     noise = SensorNoise().draw(plants.trial, ground.size, benchmark.fs)
     base = (LQG.design(benchmark) if kind == "lqg" else ADFC(nb=640, no=639)).prepare(benchmark)
 
+    observers = objective.observers(benchmark.fs)
+
     def value(x, segment):
         gain = base.estimator.filter_gain * (1 + x[1])
         changed = replace(base, estimator=replace(base.estimator, filter_gain=gain))
@@ -62,11 +64,11 @@ def test_gradient_through_checkpointed_segments(benchmark, motion, kind):
             changed = replace(changed, K_z=base.K_z * (1 + x[0]))
         else:
             changed = replace(changed, pull=base.pull * jnp.exp(x[0]))
-        sums, watch, _, peaks = loop.run(
+        states, _ = loop.run(
             benchmark, changed, plants.discretise(benchmark.dt), ground, reference, noise,
-            trials=2, lags=(6, 13), segment=segment, tally=objective.tally,
+            trials=2, observers=observers, segment=segment,
         )  # fmt: skip
-        return jnp.mean(objective.evaluate(sums, watch, peaks)[0])
+        return jnp.mean(objective.evaluate(observers, states)[0])
 
     points = 1e-5 * jnp.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     plain = jax.jit(lambda x: value(x, 0))

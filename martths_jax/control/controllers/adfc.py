@@ -68,7 +68,7 @@ class ADFC(Controller):
 
     Scalars may be given as arrays over trials (T,), `start` and `anchor` as (8, 2, T).  A fit whose
     normal matrix is singular or worse conditioned than 1e14 leaves the last good coefficients in
-    place; ``Result.watch.held`` counts these.
+    place; ``Result.counts["held"]`` is their number.
     """
 
     nb: int = field(default=1024, metadata={"static": True})

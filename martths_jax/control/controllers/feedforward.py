@@ -44,9 +44,12 @@ from martths_jax.control.estimators import design_kalman
 SOURCES = ("estimate", "measurement")
 #: What the controllers made of these pieces give beside their command.
 SIGNALS = (
-    Signal("C_A", ("coefficient", "actuator"), "1", "adaptive coefficients in scaled derivatives"),
-    Signal("held", (), "1", "fits that were not used so far"),
-)
+    Signal("C_A", ("coefficient", "actuator"), "1",
+           "adaptive coefficients in scaled derivatives", elements=tuple(
+               f"u{actuator}: x{stroke}" + "'" * order
+               for stroke in (1, 2) for order in range(4) for actuator in (1, 2))),
+    Signal("held", (), "1", "fits that the controller did not use", count=True),
+)  # fmt: skip
 
 
 @jax.tree_util.register_dataclass

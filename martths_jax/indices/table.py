@@ -1,0 +1,129 @@
+"""All indices that can be named, and how a set of them is given.
+
+    J2_1                      one of them
+    J2, FEIamp                all places of one
+    benchmark, true, ...      a group of the table, see ``GROUPS``
+    package.module:NAME       an ``Index``, or several, of one's own that can be imported
+
+From Python an ``Index`` may stand there itself.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import traceback
+from collections.abc import Iterable, Iterator, Sequence
+
+from martths_jax.errors import InputError
+from martths_jax.indices import benchmark, frequency, tracking, true_stroke
+from martths_jax.indices.base import Index
+
+#: What can be named beside the indices: the group of each file.
+GROUPS = {
+    "benchmark": benchmark.INDICES,
+    "true": true_stroke.INDICES,
+    "tracking": tracking.INDICES,
+    "frequency": frequency.INDICES,
+}
+KNOWN = {index.name: index for group in GROUPS.values() for index in group}
+#: What runs if nothing is said.
+DEFAULT = ("benchmark",)
+
+
+def choose(given: Iterable[str | Index] | str | Index = DEFAULT) -> tuple[Index, ...]:
+    """The indices that are meant, each once, in the order in which they were named.
+
+    Args:
+        given: names, groups and ``Index`` objects; or a single one; or names between commas.
+
+    Raises:
+        InputError: listing every name that is unknown or taken twice.
+    """
+    if isinstance(given, str):
+        given = [word.strip() for word in given.split(",")]
+    elif isinstance(given, Index):
+        given = [given]
+    found: dict[str, Index] = {}
+    problems = []
+    for one in given:
+        try:
+            for index in _meant(one):
+                same = found.get(index.name, KNOWN.get(index.name, index))
+                if same != index:
+                    raise InputError(
+                        f"Two indices are called {index.name!r}; give your own another name."
+                    )
+                found[index.name] = index
+        except InputError as error:
+            problems.append(str(error))
+    if not found and not problems:
+        problems = ["Argument `indices` must name at least one index, such as benchmark or J2_1."]
+    if problems:
+        raise InputError("\n".join(problems))
+    return tuple(found.values())
+
+
+def units_in_words(indices: Iterable[Index]) -> str:
+    """Which units the values of some indices have, as in "J1, J4 in ms, the others in %"."""
+    groups: dict[str, list[str]] = {}
+    for index in indices:
+        groups.setdefault(index.unit, []).append(index.group)
+    usual = max(groups, key=lambda unit: len(groups[unit]))
+    rare = [f"{', '.join(dict.fromkeys(g))} in {u}" for u, g in groups.items() if u != usual]
+    return ", ".join([*rare, f"{'the others' if rare else 'all'} in {usual}"])
+
+
+def shown_of(asked: Iterable[str], usual: tuple[str, ...], names: Sequence[str]) -> tuple[str, ...]:
+    """Names of the indices that figures and summaries show.
+
+    Args:
+        asked: by the user, or `usual` where nothing was asked for.
+        usual: what is shown of a run that has it all; else its first indices.
+        names: of the run's indices.
+    """
+    asked = tuple(dict.fromkeys(asked))
+    if asked != usual:
+        return asked
+    return tuple(n for n in usual if n in names) or tuple(names[: len(usual)])
+
+
+def _meant(one) -> Iterator[Index]:
+    if isinstance(one, Index):
+        return iter((one,))
+    if not isinstance(one, str):
+        raise InputError(
+            f"Argument `indices` must hold names and Index objects, but got {type(one).__name__}."
+        )
+    word = one.casefold()
+    if word in GROUPS:
+        return iter(GROUPS[word])
+    named = [i for i in KNOWN.values() if word in (i.name.casefold(), i.group.casefold())]
+    if named:
+        return iter(named)
+    if ":" in one:
+        return _imported(one)
+    names = list(dict.fromkeys([*GROUPS, *(i.group for i in KNOWN.values()), *KNOWN]))
+    near = difflib.get_close_matches(one, names, n=3, cutoff=0.5)
+    hint = f"the nearest are {', '.join(near)}" if near else f"groups are {', '.join(GROUPS)}"
+    raise InputError(
+        f"Index {one!r} is unknown; {hint}.  One of your own is package.module:NAME, or an Index "
+        "object in Python."
+    )
+
+
+def _imported(text: str) -> Iterator[Index]:
+    place, _, name = text.partition(":")
+    try:
+        given = getattr(importlib.import_module(place), name)
+    except Exception as error:  # code of the user's may raise anything
+        last = traceback.format_exception_only(error)[-1].strip().rstrip(".")
+        raise InputError(
+            f"Index {text!r} cannot be imported: {last}.  Give package.module:NAME."
+        ) from error
+    several = (given,) if isinstance(given, Index) else given
+    if not isinstance(several, tuple) or not all(isinstance(i, Index) for i in several):
+        raise InputError(
+            f"Index {text!r} must be an Index or a tuple of them, but is {type(given).__name__}."
+        )
+    return iter(several)

@@ -1,0 +1,29 @@
+"""The signals that the loop itself gives, in one table; a controller declares its own likewise.
+
+What stores, exports or draws a signal asks the tables for its axes, unit and label.
+"""
+
+from __future__ import annotations
+
+from martths_jax.control.base import Signal
+
+#: Signals of every run, beside those that a controller declares (``Controller.signals``).
+SIGNALS = (
+    Signal("x_a", ("actuator",), "mm", "target strokes"),
+    Signal("x_m", ("actuator",), "mm", "measured strokes"),
+    Signal("x_hat", ("actuator",), "mm", "estimated strokes"),
+    Signal("u", ("actuator",), "mm", "commands"),
+    Signal("num", ("dof",), "m, rad", "numerical interface and storey motion"),
+    Signal("est", ("interface_dof",), "m, rad", "estimated interface motion"),
+    Signal("force", ("interface_force",), "N, N m", "restoring force"),
+    # Observers see these too.  It is x_m without the sensors' noise, which the seed draws again, so
+    # that it is not worth its 16 B a sample and trial in what is stored.
+    Signal("x", ("actuator",), "mm", "true strokes", stored=False),
+)
+#: What observers are given beside the signals: the response of the reference structure.
+REFERENCE = Signal("reference", ("dof",), "m, rad", "response of the reference structure")
+
+
+def declared(controller) -> dict[str, Signal]:
+    """Signals of a run with a controller, by name: the loop's own, then the controller's."""
+    return {signal.name: signal for signal in (*SIGNALS, *controller.signals)}
