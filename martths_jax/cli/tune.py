@@ -17,6 +17,7 @@ from martths_jax.cli.console import console, error_console
 from martths_jax.cli.options import DRAWN, STUDY, one_of, option, takes
 from martths_jax.cli.run_options import Config, Fresh, Quiet, kept, set_devices, settings_of
 from martths_jax.errors import InputError
+from martths_jax.published import COMPARED
 from martths_jax.screen import ScreenTable
 from martths_jax.sensors import SensorNoise
 from martths_jax.text import counted
@@ -27,7 +28,7 @@ from martths_jax.tune.gradient import MODES
 from martths_jax.tune.report import write_report
 
 #: What a tuning has where a study has another default.
-DEFAULTS = {"trials": 32, "controllers": ("lqg",), "motions": ("elcentro-like",), "out": "tune",
+DEFAULTS = {"trials": 32, "controllers": COMPARED[:1], "motions": ("elcentro-like",), "out": "tune",
             "signals": False}  # fmt: skip
 
 
