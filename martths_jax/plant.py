@@ -64,8 +64,8 @@ class Plants:
     @property
     def parameters_hz(self) -> jax.Array:
         """(T, 9) zeros and poles [Hz]; the frame pair's entry is the factor on the pair."""
-        nominal = NOMINAL_HZ if self.nominal_hz is None else self.nominal_hz
-        return nominal * (1 + SIGMA * self.spread * self.draws)
+        nominal = NOMINAL_HZ[None] if self.nominal_hz is None else self.nominal_hz
+        return nominal * (1 + SIGMA[None] * self.spread * self.draws)
 
     def discretise(self, dt: float) -> ModalSystem:
         """Zero-order-hold discretisation of every plant at `dt` [s]."""
