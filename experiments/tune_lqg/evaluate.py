@@ -26,16 +26,13 @@ from martths_jax.figures.style import (
     save,
 )
 from martths_jax.indices import NAMES
-from martths_jax.published import ADFC as ADFC_COLUMN
-from martths_jax.published import LQG as LQG_COLUMN
-from martths_jax.published import TABLE4
+from martths_jax.published import COLUMNS, TABLE4
 from martths_jax.tune.parameters import host_controller, start_of
 
 PERCENTS = (5, 50, 95)
 
 
 MOST = 5  # designs of ADFC's front that are evaluated, besides the default
-COLUMN = {"lqg": LQG_COLUMN, "adfc": ADFC_COLUMN}
 
 
 def main() -> None:
@@ -56,7 +53,7 @@ def main() -> None:
             rows[-1]["lost [%]"] = 100 * float(np.mean(found["lost"][i]))
             rows[-1]["above 3.8 V [%]"] = 100 * float(np.mean(found["volts"][i] > VOLT_LIMIT))
             rows[-1]["largest volts"] = float(np.max(found["volts"][i]))
-        comparison += compare(name, list(named), found, COLUMN[chosen.what])
+        comparison += compare(name, list(named), found, COLUMNS[chosen.what])
         print(name, "done", flush=True)
     write(f"front_{chosen.what}.csv", rows)
     write(f"comparison_{chosen.what}.csv", comparison)
@@ -115,7 +112,7 @@ def draw(rows) -> None:
                         axis.annotate(f" {r['lost [%]']:.0f} % lost", place, va="bottom", size=6)
                 start = [r for r in mine if r["design"] == "default"]
                 one(axis, start, look(position) | {"ls": "none"}, f"{kind.upper()}, default", True)
-            for position, column in enumerate((LQG_COLUMN, ADFC_COLUMN)):
+            for position, column in enumerate(COLUMNS.values()):
                 point = [
                     np.mean([v[column] for n, v in TABLE4.items() if n.startswith(group + "_")])
                     for group in ("J5", "J8")

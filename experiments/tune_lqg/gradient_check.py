@@ -25,7 +25,7 @@ from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import draw_noise, reference_response
 from martths_jax.tune import Objective
 from martths_jax.tune.gradient import segment_length
-from martths_jax.tune.parameters import build, start_of
+from martths_jax.tune.parameters import tuned
 
 STEP = 1e-4  # of the finite differences [decades]
 
@@ -37,12 +37,13 @@ def main() -> None:
     ground = jnp.asarray(motion(TUNED_ON, chosen.records).acceleration)
     observers = objective.observers(benchmark.fs)
     noise = draw_noise(SensorNoise(seed=SEED), jnp.asarray(plants.trial), ground.size, benchmark.fs)
-    start = start_of(kind)
+    controller = tuned(kind)
+    start = controller.coordinates(controller.start)
     names, x = tuple(start), jnp.array(list(start.values()))
     inputs = (plants, ground, reference_response(benchmark, ground), noise)
 
     def value(x, plants, ground, reference, noise, segment=0):
-        ready = build(kind, benchmark, dict(zip(names, x, strict=True)))
+        ready = controller.build(benchmark, dict(zip(names, x, strict=True)))
         states, _ = loop.run(
             benchmark, ready, plants.discretise(benchmark.dt), ground, reference, noise,
             trials=len(plants), observers=observers, segment=segment,

@@ -56,8 +56,15 @@ def chain(columns, rows, start=None) -> jax.Array:
     """
     total = start
     for column, row in zip(columns, rows, strict=True):
+        row = trailing(row, column.ndim)
         total = column * row if total is None else total + column * row
     return total
+
+
+def trailing(x, axes: int):
+    """An array (..., T) with leading axes of one, so that it goes with others of so many axes."""
+    missing = axes - jnp.ndim(x)
+    return x if missing <= 0 or not jnp.ndim(x) else jnp.reshape(x, (1,) * missing + jnp.shape(x))
 
 
 def contract(matrix: jax.Array, x, axes: int = 1, start=None) -> jax.Array:

@@ -124,12 +124,7 @@ class Gradient:
         )
         self.program = jax.jit(sharded, compiler_options=compiler_options())
         noise = noise or SensorNoise()
-        self.inputs = []
-        for motion in motions:
-            ground = jnp.asarray(motion.acceleration)
-            reference = reference_response(benchmark, ground)
-            drawn = draw_noise(noise, jnp.asarray(plants.trial), ground.shape[0], fs)
-            self.inputs.append((ground, reference, drawn))
+        self.inputs = [_inputs(benchmark, plants, motion, noise) for motion in motions]
 
     def of(self, objective: Objective) -> Gradient:
         """The gradient of an objective with the same indices and other weights, not compiled anew.
@@ -157,3 +152,10 @@ class Gradient:
         mean = lambda *x: float(np.mean([np.mean(np.asarray(v)) for v in x]))  # noqa: E731
         (loss, (smooth, lost)), slope = jax.tree.map(mean, *outcomes)
         return loss, slope, smooth, lost
+
+
+def _inputs(benchmark: Benchmark, plants: Plants, motion: Motion, noise: SensorNoise) -> tuple:
+    """Ground acceleration, response of the reference structure and noise of a motion."""
+    ground = jnp.asarray(motion.acceleration)
+    drawn = draw_noise(noise, jnp.asarray(plants.trial), ground.shape[0], benchmark.fs)
+    return ground, reference_response(benchmark, ground), drawn

@@ -73,9 +73,8 @@ def test_every_campaign_takes_the_same_settings():
     mine = {}
     for command, parameter in options():
         mine.setdefault(command.removeprefix("martths "), set()).update(parameter.opts)
-    common = {"--config", "--trials", "--seed", "--controller", "--motion", "--motions",
-              "--records", "--scale", "--fs", "--out", "--fresh", "--devices",
-              "--quiet"}  # fmt: skip
+    common = {"--config", "--trials", "--seed", "--controller", "--motion", "--motions", "--fs",
+              "--records", "--scale", "--out", "--fresh", "--devices", "--quiet"}  # fmt: skip
     for command in ("study", "sweep", "sensitivity", "tune"):
         assert common <= mine[command], command
 

@@ -4,9 +4,11 @@ import csv
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 from typer.testing import CliRunner
 
 from martths_jax import InputError, Passthrough, SensorNoise, build_benchmark, indices, simulate
+from martths_jax.campaign.config import make_config
 from martths_jax.cli import app
 from martths_jax.indices import NAMES
 from martths_jax.plant import PARAMETERS
@@ -122,3 +124,22 @@ def test_a_report_shows_it(whole):
     found, pictures = open_beside(whole.folder)
     assert found.heading == whole.summary().heading
     assert pictures
+
+
+def test_it_is_exported_like_a_study(whole, tmp_path):
+    mat, table = tmp_path / "a.mat", tmp_path / "a.csv"
+    words = ["export", whole.folder, "--mat", mat, "--csv", table]
+    done = CliRunner().invoke(app, [str(w) for w in words])
+    assert done.exit_code == 0, done.output
+    assert table.read_bytes() == (whole.folder / "sensitivity.csv").read_bytes()
+    back = loadmat(mat, simplify_cells=True)
+    assert np.array_equal(back["total"], whole.dataset.total.squeeze().values, equal_nan=True)
+    assert np.array_equal(back["volt_peak"], whole.dataset.volt_peak.squeeze().values)
+    refused = CliRunner().invoke(app, ["export", str(whole.folder), "--plants", "p.csv"])
+    assert "whose design draws the plants" in str(refused.exception)
+
+
+def test_its_configuration_reads_back_and_its_runs_say_how_they_ended(whole):
+    config = make_config(whole.folder / "config.toml")
+    assert (config.trials, config.controllers) == (32, ("passthrough",))
+    assert whole.failed == 0 and whole.dataset.first_command.isnull().all()

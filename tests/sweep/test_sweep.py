@@ -7,6 +7,7 @@ import jax
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.io import loadmat
 from typer.testing import CliRunner
 
 from martths_jax import (
@@ -21,6 +22,8 @@ from martths_jax import (
     load_motion,
     simulate,
 )
+from martths_jax.campaign.config import make_config
+from martths_jax.campaign.draws import read_plants
 from martths_jax.campaign.statistics import percentile
 from martths_jax.cli import app
 from martths_jax.indices import NAMES
@@ -264,3 +267,22 @@ def test_a_report_shows_it(whole):
     found, pictures = open_beside(whole.folder)
     assert found.tables[0].rows == whole.summary().tables[0].rows
     assert pictures and all(p.suffix == ".png" for p in pictures)
+
+
+def test_it_is_exported_like_a_study(whole, tmp_path):
+    mat, table_ = tmp_path / "a.mat", tmp_path / "a.csv"
+    words = ["export", whole.folder, "--mat", mat, "--csv", table_, "--plants", tmp_path / "p.csv"]
+    done = CliRunner().invoke(app, [str(w) for w in words])
+    assert done.exit_code == 0, done.output
+    assert table_.read_bytes() == (whole.folder / "sweep.csv").read_bytes()
+    back = loadmat(mat, simplify_cells=True)
+    assert np.array_equal(back["value"], whole.dataset.value.squeeze().values, equal_nan=True)
+    assert list(back["dims"]["status"]) == list(whole.dataset.status.dims)
+    assert len(read_plants(tmp_path / "p.csv")) == TRIALS
+
+
+def test_its_configuration_reads_back(whole):
+    path = whole.folder / "config.toml"
+    config = make_config(path)
+    assert (config.trials, config.motions) == (TRIALS, ("one", "two"))
+    assert "scale=0.5,1.0,2000.0 noise_power=0.0,1.5e-07,3e-07" in path.read_text()

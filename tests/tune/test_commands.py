@@ -1,10 +1,16 @@
 """``martths tune`` as a user types it: one clear sentence for each mistake."""
 
+import csv
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
-from martths_jax.cli import main
+from martths_jax.cli import app, main
 from martths_jax.tune import search as searching
+from tests.tune import guest as guests
 from tests.tune.bowl import Bowl
 
 
@@ -73,3 +79,30 @@ def test_an_unstable_start_is_one_sentence(capsys, monkeypatch, tmp_path, short_
     assert code == 2
     assert "`start` must be stable on every plant, but 100 % of the trials diverged" in text
     assert "Traceback" not in text
+
+
+def tuned(*words):
+    """``martths tune`` with these words, in this process."""
+    done = CliRunner().invoke(app, ["tune", *map(str, words)])
+    assert done.exit_code == 0, done.output
+
+
+def test_a_controller_of_a_file_is_tuned_and_goes_on_by_its_configuration(tmp_path, short_motion):
+    other, out = tmp_path / "other.csv", tmp_path / "out"
+    other.write_bytes(short_motion.read_bytes())
+    guest = tmp_path / "guest.py"
+    guest.write_bytes(Path(guests.__file__).read_bytes())
+    words = ["--objective", "j2", "--check-motion", other, "--check-trials", 2, "--out", out]
+    new = ["--controller", f"{guest}:Lead{{lead=0.002}}", "--motion", short_motion, "--trials", 2]
+    tuned("--steps", 3, *words, *new)
+    first = json.loads((out / "state.json").read_text())["history"]
+    assert first[0]["lead"] == 0.002 and len(first) == 3
+    assert min(row["objective"] for row in first) < first[0]["objective"]
+    tuned("--steps", 4, *words, "--config", out / "config.toml", "--quiet")
+    assert json.loads((out / "state.json").read_text())["history"][:3] == first
+    with (out / "comparison.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 26 and {row["published"] for row in rows} == {""}
+    assert float(rows[2]["tuned"]) < float(rows[2]["start"]), "J2_1"
+    design = json.loads((out / "design.json").read_text())
+    assert design["controller"].endswith("guest.py:Lead") and design["lead"] > 0.002
