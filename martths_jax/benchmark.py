@@ -13,9 +13,7 @@ from martths_jax.control.base import Estimator
 from martths_jax.coupler import Coupler, build_coupler
 from martths_jax.errors import argument_error
 from martths_jax.plant import (
-    NOMINAL_HZ,
     Plants,
-    continuous_modes,
     lowest_rate,
     nominal_plant,
     one_plant,
@@ -35,6 +33,7 @@ from martths_jax.structure.integrators import INTEGRATORS
 from martths_jax.structure.modal import ModalSystem
 from martths_jax.structure.sections import check_positive
 from martths_jax.structure.statespace import discretise
+from martths_jax.transfer import NOMINAL_HZ, continuous_modes
 
 PARTITIONS = ("benchmark", "consistent")
 #: Strokes that the restoring force can be made from, beside those of a filter of one's own.

@@ -12,10 +12,11 @@ from martths_jax.control.adaptive.inverse import BAND_HZ
 from martths_jax.control.controllers import Controller
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import Motion
-from martths_jax.plant import IdealPlants, Plants, frequency_response
+from martths_jax.plant import IdealPlants, Plants
 from martths_jax.resources import available_memory
 from martths_jax.sensors import SensorNoise
 from martths_jax.structure.modal import ModalSystem, to_dense
+from martths_jax.transfer import frequency_response
 
 #: Numbers a sample and trial that ``keep=True`` stores, ADFC's coefficients among them.
 KEPT_NUMBERS = 36

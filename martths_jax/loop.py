@@ -200,10 +200,6 @@ def run(
     windows = -(-rows // length)
     pieces = tuple(dict.fromkeys(name for o in observers for name in o.pieces))
 
-    def in_windows(x):
-        padded = jnp.pad(x, [(0, windows * length - rows)] + [(0, 0)] * (x.ndim - 1))
-        return padded.reshape(windows, length, *x.shape[1:])
-
     def sample(moving, inputs):
         state, seen = moving
         ground_k, reference_k, noise_k, delayed = inputs
@@ -242,31 +238,43 @@ def run(
             state = replace(state, compensator=box)
         return (records, (state, seen)), emitted
 
-    blank = line.blank if line else None
-    records = jax.tree.map(lambda x: jnp.zeros((length, *x.shape), x.dtype), blank)
+    empty = lambda x: jnp.zeros((length, *x.shape), x.dtype)  # noqa: E731
+    records = jax.tree.map(empty, line.blank if line else None)
     state = initial_state(benchmark, compensator, plant, trials)
     carry = (records, (state, tuple(observer.init(trials) for observer in observers)))
-    inputs = (in_windows(ground), in_windows(reference), in_windows(noise))
+    inputs = tuple(_in_windows(x, windows, length) for x in (ground, reference, noise))
     if samples is None:
         carry, emitted = jax.lax.scan(window, carry, inputs)
     else:
-        inputs_at = lambda i: jax.tree.map(lambda x: x[i], inputs)  # noqa: E731
-        # What lies beyond the motion's end is left as zeros.
-        shapes = jax.eval_shape(window, carry, inputs_at(0))[1]
-        blank = jax.tree.map(lambda x: jnp.zeros((windows, *x.shape)), shapes)
-
-        def one(i, so_far):
-            carry, emitted = so_far
-            carry, new = window(carry, inputs_at(i))
-            put = jax.lax.dynamic_update_index_in_dim
-            return carry, jax.tree.map(lambda x, row: put(x, row, i, 0), emitted, new)
-
-        carry, emitted = jax.lax.fori_loop(0, -(-N // length), one, (carry, blank))
+        carry, emitted = _scan_first(window, carry, inputs, -(-N // length))
 
     _, (_, seen) = carry
     whole = lambda x: x.reshape(windows * length, *x.shape[2:])[:rows]  # noqa: E731
     finished = (observer.finish(one) for observer, one in zip(observers, seen, strict=True))
     return tuple(finished), jax.tree.map(whole, emitted)
+
+
+def _in_windows(x: jax.Array, windows: int, length: int) -> jax.Array:
+    """(N, ...) filled up with zeros and cut to (windows, length, ...)."""
+    padded = jnp.pad(x, [(0, windows * length - x.shape[0])] + [(0, 0)] * (x.ndim - 1))
+    return padded.reshape(windows, length, *x.shape[1:])
+
+
+def _scan_first(body, carry, inputs, count: jax.Array):
+    """``jax.lax.scan`` over the first `count` of the inputs, a traced number; the outputs of the
+    rest are zeros."""
+    inputs_at = lambda i: jax.tree.map(lambda x: x[i], inputs)  # noqa: E731
+    rows = jax.tree.leaves(inputs)[0].shape[0]
+    shapes = jax.eval_shape(body, carry, inputs_at(0))[1]
+    blank = jax.tree.map(lambda x: jnp.zeros((rows, *x.shape)), shapes)
+
+    def one(i, so_far):
+        carry, outputs = so_far
+        carry, new = body(carry, inputs_at(i))
+        put = jax.lax.dynamic_update_index_in_dim
+        return carry, jax.tree.map(lambda x, row: put(x, row, i, 0), outputs, new)
+
+    return jax.lax.fori_loop(0, count, one, (carry, blank))
 
 
 def window_of(controller: Controller) -> int:

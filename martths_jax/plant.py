@@ -1,11 +1,6 @@
 """The control plant: two actuators with their controllers, pushing one frame (mm in, mm out).
 
-    H_ij(s) = k_ij prod(s - z) / prod(s - p),   i = output, j = input
-
-Column j of H shares its poles, so it is one four-state system with two outputs; the frame's pole
-pair stands in both columns.  All poles are simple and known, so the modal form and its zero-order
-hold are written down exactly (partial fractions) instead of being computed from a matrix
-exponential: cheap for 100 000 plants, and differentiable in every zero and pole.
+Nine of its zeros and poles are uncertain; ``transfer`` has what follows from them.
 """
 
 from __future__ import annotations
@@ -19,21 +14,19 @@ import numpy as np
 from martths_jax.errors import InputError, argument_error, check_seed, check_whole
 from martths_jax.runtime import check_precision, check_runtime
 from martths_jax.structure.modal import ModalSystem
+from martths_jax.transfer import (
+    FRAME_POLE_HZ,
+    NOMINAL_HZ,
+    discretise_parameters,
+)
 
-HZ = 2 * np.pi  # rad/s per Hz
 #: The nine uncertain parameters in the order of the draws.
 PARAMETERS = (
     "zero1_col1", "zero2_col1", "pole1_col1", "pole2_col1", "frame_pair",
     "zero_h12", "zero_h22", "pole1_col2", "pole2_col2",
 )  # fmt: skip
-#: Nominal zeros and poles [Hz]; the frame pair's entry scales ``FRAME_POLE_HZ``.
-NOMINAL_HZ = np.array([-120.0, -90.0, -2.65, -40.0, 1.0, -3.0, -5.0, -3.5, -18.5])
-FRAME_POLE_HZ = complex(-50.0, 63.0)
 #: Relative standard deviation of each parameter (paper, Table 2).
 SIGMA = np.array([0.055, 0.055, 0.06, 0.06, 0.05, 0.03, 0.03, 0.03, 0.03])
-#: k_ij of the nominal plant, output by row.
-NOMINAL_GAIN = np.array([[2165.2, 4.5394e6], [349.95, 1.9238e7]])
-
 #: Largest trial number: random streams tell 32 bits of them apart.
 MOST_TRIALS = 2**32 - 1
 PLANT_STREAM = 0  # separates plant draws from noise draws of the same seed
@@ -287,121 +280,3 @@ def check_plants(plants: Plants, name: str = "draws") -> Plants:
             f"{PARAMETERS[column]} = 0 in row {row}",
         )  # fmt: skip
     return plants
-
-
-def _factors(parameters_hz: jax.Array, xp=jnp):
-    """Zeros, real poles, frame pole [rad/s] and rescaled gains of a batch of plants.
-
-    Returns:
-        zeros: per output and column, list of (T,) arrays; poles: per column (p1, p2); frame: (T,)
-        complex; gain: (2, 2, T), rescaled so that the DC gain stays nominal.
-    """
-    s = xp.moveaxis(xp.asarray(parameters_hz), -1, 0) * HZ
-    z1, z2, p1, p2, frame, z12, z22, p3, p4 = s
-    frame = frame * FRAME_POLE_HZ
-    zeros = [[(z1, z2), (z12,)], [(z1, z2), (z22,)]]
-    poles = [(p1, p2), (p3, p4)]
-    n = NOMINAL_HZ * HZ
-    nominal_zeros = [[(n[0], n[1]), (n[5],)], [(n[0], n[1]), (n[6],)]]
-    nominal_poles = [(n[2], n[3]), (n[7], n[8])]
-    pair = abs(FRAME_POLE_HZ * HZ) ** 2
-    gain = []
-    for i in range(2):
-        row = []
-        for j in range(2):
-            dc = NOMINAL_GAIN[i, j] * np.prod([-z for z in nominal_zeros[i][j]])
-            dc = dc / (np.prod([-p for p in nominal_poles[j]]) * pair)
-            numerator = xp.prod(xp.stack([-z for z in zeros[i][j]]), axis=0)
-            row.append(dc * poles[j][0] * poles[j][1] * (frame * frame.conj()).real / numerator)
-        gain.append(row)
-    return zeros, poles, frame, gain
-
-
-def frequency_response(parameters_hz, frequency_hz) -> jax.Array:
-    """H(j 2 pi f) of a batch of plants.
-
-    Args:
-        parameters_hz: (T, 9) as in ``Plants.parameters_hz``.
-        frequency_hz: (F,) frequencies [Hz].
-
-    Returns:
-        (F, 2, 2, T) complex response, mm a mm; by NumPy, without compiling, for NumPy's arrays.
-    """
-    xp = np if isinstance(parameters_hz, np.ndarray) else jnp
-    zeros, poles, frame, gain = _factors(parameters_hz, xp)
-    s = 2j * xp.pi * xp.asarray(frequency_hz)[:, None]
-
-    def entry(i, j):
-        numerator = gain[i][j] * xp.ones_like(s)
-        for z in zeros[i][j]:
-            numerator = numerator * (s - z)
-        p, q = poles[j]
-        return numerator / ((s - p) * (s - q) * (s - frame) * (s - frame.conj()))
-
-    return xp.stack([xp.stack([entry(i, j) for j in range(2)], 1) for i in range(2)], 1)
-
-
-def continuous_modes(parameters_hz: jax.Array):
-    """Partial fractions of a batch of plants.
-
-    Returns:
-        poles: (4, T) complex: real pair of column 1, its frame pole, then the same of column 2
-            as (p1, p2, frame) -> arrays ``real`` (2 columns, 2, T) and ``frame`` (T,).
-        residues: ``real`` (2 outputs, 2 columns, 2, T) and ``frame`` (2 outputs, 2 columns, T).
-    """
-    zeros, poles, frame, gain = _factors(parameters_hz)
-    real_residue, frame_residue = [], []
-    for i in range(2):
-        row_real, row_frame = [], []
-        for j in range(2):
-            p, q = poles[j]
-
-            def numerator(s, i=i, j=j):
-                value = gain[i][j]
-                for z in zeros[i][j]:
-                    value = value * (s - z)
-                return value
-
-            pair_p = ((p - frame) * (p - frame.conj())).real
-            pair_q = ((q - frame) * (q - frame.conj())).real
-            row_real.append(
-                jnp.stack([numerator(p) / ((p - q) * pair_p), numerator(q) / ((q - p) * pair_q)])
-            )
-            row_frame.append(
-                numerator(frame) / ((frame - p) * (frame - q) * (frame - frame.conj()))
-            )
-        real_residue.append(jnp.stack(row_real))
-        frame_residue.append(jnp.stack(row_frame))
-    real = jnp.stack([jnp.stack(pair) for pair in poles])
-    return real, frame, jnp.stack(real_residue), jnp.stack(frame_residue)
-
-
-def discretise_parameters(parameters_hz: jax.Array, dt: float) -> ModalSystem:
-    """Zero-order hold of a batch of plants, in modal form.
-
-    Slots: real pair and frame pair of column 1, then of column 2.  The states are those of the
-    continuous modal form z' = p z + u, sampled, so a gain designed in continuous time holds.
-
-    Args:
-        parameters_hz: (T, 9) zeros and poles [Hz].
-        dt: sample period [s].
-    """
-    real, frame, real_residue, frame_residue = continuous_modes(parameters_hz)
-    T = frame.shape[0]
-    decay, turn = jnp.exp(real * dt), jnp.exp(frame * dt)
-    push, push_frame = (decay - 1) / real, (turn - 1) / frame
-    a = jnp.stack([decay[0], jnp.stack([turn.real] * 2), decay[1], jnp.stack([turn.real] * 2)], 1)
-    swap = jnp.stack([-turn.imag, turn.imag])
-    b = jnp.stack([jnp.zeros((2, T)), swap, jnp.zeros((2, T)), swap], 1)
-    frame_input = jnp.stack([push_frame.real, push_frame.imag])
-    column = [jnp.stack([push[j], frame_input], 1) for j in range(2)]  # (2, 2 slots, T)
-    none = jnp.zeros((2, 2, T))
-    B = jnp.stack([jnp.concatenate([column[0], none], 1), jnp.concatenate([none, column[1]], 1)], 2)
-    rows = []
-    for i in range(2):
-        slots = []
-        for j in range(2):
-            slots.append(real_residue[i, j])
-            slots.append(jnp.stack([2 * frame_residue[i, j].real, -2 * frame_residue[i, j].imag]))
-        rows.append(jnp.stack(slots, 1))
-    return ModalSystem(a=a, b=b, B=B, C=jnp.stack(rows))

@@ -1,17 +1,25 @@
 """Frozen-loop figures: spectral radius along El Centro and delay margins, over plants.
 
-    MARTHS_RECORDS=... python experiments/guarded_adfc/stability_figures.py
+MARTHS_RECORDS=... python experiments/guarded_adfc/stability_figures.py
 """
 
 from __future__ import annotations
 
 import numpy as np
 from candidates import CANDIDATES, CHOSEN, inverse
-from fast_loop import run
 from study import RECORDS
 
-from martths_jax import ADFC, LQG, Passthrough, build_benchmark, draw_plants, load_motion
-from martths_jax.stability import delay_margin, frozen_adfc, radius_along, spectral_radius
+from martths_jax import (
+    ADFC,
+    LQG,
+    Passthrough,
+    SensorNoise,
+    build_benchmark,
+    draw_plants,
+    load_motion,
+    simulate,
+)
+from martths_jax.stability import delay_margin, radius_along, spectral_radius
 
 PLANTS, FROM_S = 32, 2.0
 
@@ -23,13 +31,14 @@ def main():
     samples = np.arange(round(FROM_S * bench.fs), motion.acceleration.size, 512)
     identified = {}
     for name in ("literal", CHOSEN):
-        outcome = run(bench, CANDIDATES[name](bench), plants, motion, seed=1, keep=PLANTS // 8)
-        C = outcome.signals[:, :, 8:].reshape(len(outcome.signals), -1, 8, 2)[:PLANTS]
-        identified[name] = C
-        radius = radius_along(bench, ADFC(), plants, C, samples)
-        alive = outcome.first_bad[:, None] > samples
+        controller = CANDIDATES[name](bench)
+        result = simulate(bench, controller, plants, motion, SensorNoise(seed=1), keep=True)
+        C = identified[name] = result.signals["C_A"]
+        radius = radius_along(bench, controller, plants, C, samples)
+        first_bad = np.minimum(result.watch.command, result.watch.stroke).min(axis=1)
+        alive = first_bad[:, None] > samples
         print(
-            f"{name}: {outcome.lost.sum()} of {PLANTS} lost; frozen loop unstable at "
+            f"{name}: {result.lost.sum()} of {PLANTS} lost; frozen loop unstable at "
             f"{100 * np.mean(radius[alive] > 1):.2f} % of instants, largest radius "
             f"{np.max(radius[alive]):.5f}, {np.sum(np.any((radius > 1) & alive, axis=1))} trials "
             "with such an instant",
@@ -40,8 +49,8 @@ def main():
         "passthrough": Passthrough(q=ADFC().q).prepare(bench),
         "LQG (defaults)": LQG.design(bench),
         "LQG (measured error)": LQG.design(bench, error="measured"),
-        "inverse, never adapted": frozen_adfc(bench, ADFC(), inverse(bench)),
-        "ADFC frozen at 12 s": frozen_adfc(bench, ADFC(), np.moveaxis(middle, 0, -1)),
+        "inverse, never adapted": ADFC().frozen(bench, inverse(bench)),
+        "ADFC frozen at 12 s": ADFC().frozen(bench, np.moveaxis(middle, 0, -1)),
     }
     for name, controller in loops.items():
         radius = spectral_radius(bench, controller, plants)

@@ -51,17 +51,38 @@ def exchange_observation(rows: Rows, phi, values, phi_leaving, values_leaving) -
     )
 
 
-def pulled(rows: Rows, weight, towards: jax.Array) -> Rows:
+def pulled(rows: Rows, weight, towards: Sequence[Sequence[jax.Array]]) -> Rows:
     """Add weight |c - towards|^2 to the least-squares problem.
 
     Args:
         weight: scalar or (T,), same unit as G.
-        towards: (n, r) or (n, r, T).
+        towards: n rows of r numbers, scalars or (T,).
     """
     n = len(rows)
     return tuple(
         (row[0] + weight, *row[1 : n - j])
-        + tuple(h + weight * towards[j, i] for i, h in enumerate(row[n - j :]))
+        + tuple(h + weight * towards[j][i] for i, h in enumerate(row[n - j :]))
+        for j, row in enumerate(rows)
+    )
+
+
+def weighted(rows: Rows, weight: jax.Array, towards=None) -> Rows:
+    """Add trace (c - towards)' W (c - towards), one weight for each pair of unknowns.
+
+    Args:
+        weight: symmetric W, (n, n) or (n, n, T), same unit as G.
+        towards: as for ``pulled``; None stands for zero.
+    """
+    n = len(rows)
+
+    def side(j, i, h):
+        if towards is None:
+            return h
+        return h + sum(weight[j, m] * towards[m][i] for m in range(n))
+
+    return tuple(
+        tuple(g + weight[j, j + m] for m, g in enumerate(row[: n - j]))
+        + tuple(side(j, i, h) for i, h in enumerate(row[n - j :]))
         for j, row in enumerate(rows)
     )
 
@@ -84,6 +105,19 @@ def solve_ldl(rows: Rows) -> tuple[list[list[jax.Array]], jax.Array]:
     """
     work, tolerance = _eliminate(rows)
     return _substitute(work), tolerance
+
+
+@once
+def pivots(rows: Rows) -> list[jax.Array]:
+    """d_1 ... d_n (T,) of G = L D L': what each regressor has beyond those before it."""
+    n = len(rows)
+    work = [list(row[: n - j]) for j, row in enumerate(rows)]
+    for j in range(n):
+        for i in range(j + 1, n):
+            share = work[j][i - j] / work[j][0]
+            for m in range(len(work[i])):
+                work[i][m] = work[i][m] - share * work[j][i - j + m]
+    return [row[0] for row in work]
 
 
 @once

@@ -9,6 +9,7 @@ sessions or on how many devices it was computed: that is in ``provenance.json``.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import h5netcdf
@@ -17,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from martths_jax.campaign.checksum import CHECKSUM, content_digest
-from martths_jax.campaign.engine import FIRSTS
+from martths_jax.campaign.engine import FIRSTS, Outcome
 from martths_jax.campaign.files import writing
 from martths_jax.campaign.store import FORMAT, RunFolder
 from martths_jax.errors import InputError
@@ -46,6 +47,34 @@ _FIRST_WORDS = {
 }
 
 
+def outcome_variables(
+    identity: dict,
+    dims: Sequence[str],
+    gather: Callable[[Callable[[Outcome], np.ndarray]], np.ndarray],
+) -> dict:
+    """Variables that the results of every campaign have: what became of each run.
+
+    Args:
+        identity: of the run.
+        dims: of a run: dimensions of the cells, then of their rows.
+        gather: puts an array of each cell's ``Outcome``, (rows, ...), together over all cells.
+    """
+    cell = tuple(dims)
+    variables = {
+        "value": ((*cell, "index"), gather(lambda o: o.value), {
+            "long_name": "evaluation indices; NaN where there is none, see status"} | INDEX_UNITS),
+        "status": (cell, gather(lambda o: o.status), {
+            "long_name": "how the trial ended"} | STATUS_FLAGS),
+        "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
+            "long_name": "largest valve command", "units": "V"}),
+    } | index_variables(identity) | count_variables(identity, cell, gather)  # fmt: skip
+    for i, name in enumerate(FIRSTS):
+        variables[f"first_{name}"] = ((*cell, "actuator"), gather(lambda o, i=i: o.first[:, i]), {
+            "long_name": f"first sample with {_FIRST_WORDS[name]}; NaN = never",
+            "units": "samples"})  # fmt: skip
+    return variables
+
+
 def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
     """All results of a complete run.
 
@@ -64,23 +93,13 @@ def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
         return np.stack([np.stack([pick(outcome) for outcome in row]) for row in cells])
 
     cell = ("controller", "motion", "trial")
-    variables = {
-        "value": ((*cell, "index"), gather(lambda o: o.value), {
-            "long_name": "evaluation indices; NaN where there is none, see status"} | INDEX_UNITS),
-        "status": (cell, gather(lambda o: o.status), {
-            "long_name": "how the trial ended"} | STATUS_FLAGS),
-        "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
-            "long_name": "largest valve command", "units": "V"}),
+    variables = outcome_variables(identity, cell, gather) | {
         "draw": (("trial", "parameter"), np.asarray(plants.draws), {
             "long_name": "standard normal draws of the plant", "units": "1"}),
         "plant_hz": (("trial", "parameter"), np.asarray(plants.parameters_hz), {
             "long_name": "zeros and poles of the plant; frame_pair is the factor on the pair",
             "units": "Hz"}),
-    } | index_variables(identity) | count_variables(identity, cell, gather)  # fmt: skip
-    for i, name in enumerate(FIRSTS):
-        variables[f"first_{name}"] = ((*cell, "actuator"), gather(lambda o, i=i: o.first[:, i]), {
-            "long_name": f"first sample with {_FIRST_WORDS[name]}; NaN = never",
-            "units": "samples"})  # fmt: skip
+    }  # fmt: skip
     variables |= _motion_variables(identity)
     coordinates = {
         "controller": np.array(controllers),

@@ -18,9 +18,10 @@ from scipy.stats import norm, qmc
 
 from martths_jax.campaign.files import writing
 from martths_jax.errors import InputError, argument_error
-from martths_jax.plant import HZ, NOMINAL_HZ, PARAMETERS, SIGMA, Plants, draw_plants
+from martths_jax.plant import PARAMETERS, SIGMA, Plants, draw_plants
 from martths_jax.plant import plant_from_draws as check_draws
 from martths_jax.resources import available_memory
+from martths_jax.transfer import HZ, NOMINAL_HZ
 
 #: Trials that are drawn together.  Always the same number at the same place, so that the bits of a
 #: draw do not depend on how many are asked for.

@@ -25,6 +25,7 @@ ENGINE_MODULES = (
     "simulation.py",
     "structure/*.py",
     "structure/*/*.py",
+    "transfer.py",
     "watch.py",
     "xla_flags.py",
 )

@@ -12,10 +12,9 @@ from scipy.io import savemat
 
 from martths_jax.campaign.draws import write_plants
 from martths_jax.campaign.files import writing
+from martths_jax.campaign.tidy import write_runs
 from martths_jax.errors import InputError
 from martths_jax.plant import Plants
-from martths_jax.text import csv_field
-from martths_jax.watch import Status
 
 #: Largest variable that MATLAB reads from such a file [bytes].
 MOST_BYTES = 2**31 - 2**16
@@ -26,21 +25,7 @@ def write_csv(dataset: xr.Dataset, path: Path) -> None:
 
     Numbers have all their digits; an index of a trial that diverged is empty.
     """
-    names = [str(n) for n in dataset["index"].values]
-    heads = ["controller", "motion", "trial", "status", *names, "volt_peak_1", "volt_peak_2"]
-    words = {int(s): s.name.lower() for s in Status}
-    with writing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.write(",".join(heads) + "\n")
-        for controller in dataset.controller.values:
-            for motion in dataset.motion.values:
-                cell = dataset.sel(controller=controller, motion=motion)
-                start = f"{csv_field(controller)},{csv_field(motion)}"
-                numbers = np.hstack([cell.value.values, cell.volt_peak.values]).tolist()
-                for trial, status, row in zip(
-                    cell.trial.values, cell.status.values, numbers, strict=True
-                ):
-                    cells = ",".join("" if x != x else repr(x) for x in row)
-                    file.write(f"{start},{trial},{words[int(status)]},{cells}\n")
+    write_runs(dataset, path, after=["volt_peak"])
 
 
 def write_mat(dataset: xr.Dataset, path: Path, signals: Iterable[xr.Dataset] = ()) -> None:

@@ -93,8 +93,9 @@ def write_template(path: Path, overwrite: bool = False) -> None:
     write_text(path, template(path.name))
 
 
-def write_config(settings: dict, path: Path) -> None:
-    """The effective configuration of a run, to be read back by ``--config``."""
+def write_config(settings: dict, path: Path, remark: str = "") -> None:
+    """The effective configuration of a run, to be read back by ``--config``, below a comment."""
+    head = "".join(f"# {line}\n" for line in remark.splitlines())
     blank = {field.name: None for field in FIELDS}
     sections = [_section(s, blank | settings, comments=False) for s in SECTIONS]
-    write_text(path, "\n".join([*sections, *_tables(settings["controller"])]))
+    write_text(path, head + "\n".join([*sections, *_tables(settings["controller"])]))

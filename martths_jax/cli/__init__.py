@@ -11,7 +11,7 @@ import typer
 from rich.markup import escape
 
 from martths_jax import __version__
-from martths_jax.cli import figures, motions, nominal, sensitivity, study, sweep, tune
+from martths_jax.cli import export, figures, motions, nominal, sensitivity, study, sweep, tune
 from martths_jax.cli.console import accept_any_text, error_console
 from martths_jax.errors import InputError
 from martths_jax.runtime import check_devices
@@ -28,7 +28,7 @@ app.command("study")(study.study)
 app.command("init-config")(study.init_config)
 app.command("merge")(study.merge)
 app.command("summary")(study.summary)
-app.command("export")(study.export)
+app.command("export")(export.export)
 app.command("sweep")(sweep.sweep)
 app.command("sensitivity")(sensitivity.sensitivity)
 app.command("figures")(figures.figures)

@@ -3,44 +3,39 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from martths_jax.cli.console import console, error_console
-from martths_jax.cli.motion_options import Records
+from martths_jax.cli.motion_options import Motions, Records
+from martths_jax.cli.options import Trial, one_of, option, setting
 from martths_jax.cli.study import Folder
 from martths_jax.files import atomic
 from martths_jax.study import Lines, open_study
 from martths_jax.text import counted
 
-Trial = Annotated[
-    int, typer.Option("--trial", min=0, help="Whose histories are drawn; 0 = nominal plant.")
-]
-Only = Annotated[
-    list[str] | None, typer.Option("--only", help="Figures whose names begin so, as fig14.")
-]
+Only = option(
+    list[str] | None, "--only", metavar="NAME",
+    help="Figures whose names begin so, as fig14; repeated or with commas",
+)  # fmt: skip
 
 
 def figures(
     folder: Folder,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Folder of the figures [FOLDER/figures].")
-    ] = None,
+    out: setting("out", "a folder, FOLDER/figures") = None,
     trial: Trial = 0,
-    motion: Annotated[
-        str | None, typer.Option("--motion", help="Motion of the figures that show one.")
-    ] = None,
+    motion: Motions = None,
     only: Only = None,
-    dpi: Annotated[int, typer.Option("--dpi", min=50, max=1200, help="Of the PNG files.")] = 300,
+    dpi: option(int, "--dpi", min=50, max=1200, help="Dots an inch of PNG files") = 300,
 ) -> None:
     """Draw the paper's figures and more: PDF, PNG and CSV of what is drawn, one each."""
     from martths_jax.figures import draw_figures
 
     out = out or folder / "figures"
     paths = draw_figures(
-        folder, out, trial=trial, motion=motion, only=only or (), dpi=dpi, progress=_tell
-    )
+        folder, out, trial=trial, motion=one_of("--motion", motion), only=only or (), dpi=dpi,
+        progress=_tell,
+    )  # fmt: skip
     _say(f"Wrote {counted(len(paths), 'file')} to {out}")
 
 
@@ -54,10 +49,8 @@ def _say(text: str) -> None:
 
 def table(
     folder: Folder,
-    style: Annotated[str, typer.Option("--format", help="md, tex (booktabs) or csv.")] = "md",
-    out: Annotated[
-        Path | None, typer.Option("--out", help="File to write instead of the screen.")
-    ] = None,
+    style: option(str, "--format", help="md, tex (booktabs) or csv") = "md",
+    out: setting("out", "the screen") = None,
 ) -> None:
     """Table 4 with our columns beside the published ones, and percentiles over the plants."""
     from martths_jax.report import render
@@ -73,17 +66,15 @@ def table(
 
 def report(
     folder: Folder,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="File to write [FOLDER/report.html].")
-    ] = None,
+    out: setting("out", "a file, FOLDER/report.html") = None,
     trial: Trial = 0,
     only: Only = None,
-    beside: Annotated[
+    beside: option(
         list[Path] | None,
-        typer.Option(
-            "--beside", help="Folder of a sweep, sensitivity study or tuning to show; repeatable."
-        ),
-    ] = None,
+        "--beside",
+        metavar="DIR",
+        help="Folders of sweeps, sensitivity analyses or tunings to show; repeated or with commas",
+    ) = None,
 ) -> None:
     """Write one HTML file to look through a study: tables, figures, all trials, histories."""
     from martths_jax.report import write_report
@@ -96,11 +87,9 @@ def report(
 
 def replay(
     folder: Folder,
-    trial: Annotated[int, typer.Option("--trial", min=0, help="Which; 0 = nominal plant.")],
+    trial: Trial,
     records: Records = None,
-    with_report: Annotated[
-        bool, typer.Option("--report/--no-report", help="Write the report anew.")
-    ] = True,
+    with_report: option(bool, "--report/--no-report", help="Write the report anew") = True,
 ) -> None:
     """Run one trial again bit for bit, keep all its signals, and add it to the report."""
     from martths_jax.report import replay as run_again

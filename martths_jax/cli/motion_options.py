@@ -1,6 +1,6 @@
 """The options that say which ground motions a command runs on, the same for every command.
 
-def run(motion: Motions = DEFAULT, records: Records = None, scale: Scale = None, ...):
+def run(motion: Motions, records: Records = None, scale: Scale = None, ...):
     for one in load_all(motion, records, scale, pga, sa, units, resample, fs): ...
 """
 
@@ -8,61 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich.markup import escape
 
 from martths_jax.cli.console import console
+from martths_jax.cli.options import setting
 from martths_jax.motions import DEFAULT_SCALE, Motion, load_motion
 
-Motions = Annotated[
-    list[str],
-    typer.Option(
-        "--motion",
-        help="Built-in motion (elcentro-like, kobe-like, morganhill-like), name under --records, "
-        "or path of a file (.mat, .npy, .AT2, .V2, .smc, .csv ...); may be repeated.",
-    ),
-]
-Records = Annotated[
-    Path | None,
-    typer.Option(
-        "--records",
-        metavar="DIR",
-        help="Folder of ground motions, found by name [default: $MARTHS_RECORDS].",
-    ),
-]
-Scale = Annotated[
-    float | None,
-    typer.Option("--scale", help=f"Factor on the unscaled record [default: {DEFAULT_SCALE}]."),
-]
-Pga = Annotated[
-    str | None, typer.Option("--pga", help="Scale to this PGA instead, such as 0.4g or 3.9m/s2.")
-]
-Sa = Annotated[
-    str | None,
-    typer.Option("--sa", help="Scale to this 5 %-damped Sa instead, such as 0.3g@2.29Hz."),
-]
-Units = Annotated[
-    str | None,
-    typer.Option("--units", help="Unit of files that do not say theirs: g, m/s2 or cm/s2."),
-]
-Dt = Annotated[
-    float | None,
-    typer.Option("--dt", metavar="S", help="Time step of files that do not say theirs [s]."),
-]
-Variable = Annotated[
-    str | None,
-    typer.Option(
-        "--variable",
-        metavar="NAME|NUMBER",
-        help="Column, channel or array of files that hold several.",
-    ),
-]
-Resample = Annotated[
-    str,
-    typer.Option("--resample", help="linear (the benchmark's) or bandlimited."),
-]
+Motions = setting("motions")
+Records = setting("records", "$MARTHS_RECORDS")
+Scale = setting("scale", DEFAULT_SCALE)
+Pga = setting("pga")
+Sa = setting("sa")
+Units = setting("units")
+Dt = setting("dt")
+Variable = setting("variable")
+Resample = setting("resample", "linear")
 
 
 def load_all(
@@ -72,7 +33,7 @@ def load_all(
     pga: str | None = None,
     sa: str | None = None,
     units: str | None = None,
-    resample: str = "linear",
+    resample: str | None = None,
     fs: float = 1024,
     dt: float | None = None,
     variable: str | None = None,
@@ -87,7 +48,7 @@ def load_all(
             units=units,
             pga=pga,
             sa=sa,
-            resample=resample,
+            resample=resample or "linear",
             dt=dt,
             variable=variable,
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -11,6 +10,7 @@ from rich.progress import Progress
 
 from martths_jax.cli.console import console
 from martths_jax.cli.motion_options import Dt, Records, Units, Variable
+from martths_jax.cli.options import option, required, setting
 from martths_jax.motions import MotionInfo, available_motions, load_record, write_ensemble
 from martths_jax.motions.figure import draw_motion
 from martths_jax.motions.overview import FIRST_MODE
@@ -60,7 +60,7 @@ def _table(found: list[MotionInfo]) -> ScreenTable:
 @app.command()
 def show(
     name: Annotated[str, typer.Argument(help="Name or path of a motion.")],
-    out: Annotated[Path, typer.Option("--out", help="Picture to write: .png, .pdf or .svg.")],
+    out: required("out", "a picture: .png, .pdf or .svg"),
     records: Records = None,
     units: Units = None,
     dt: Dt = None,
@@ -76,12 +76,10 @@ def show(
 
 @app.command()
 def make(
-    like: Annotated[
-        str, typer.Option("--like", help="Target: elcentro, kobe, morganhill, or any motion.")
-    ],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write into.")],
-    count: Annotated[int, typer.Option("--count", help="Number of motions.")] = 10,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the ensemble.")] = 0,
+    like: option(str, "--like", help="Target: elcentro, kobe, morganhill, or any motion"),
+    out: required("out", "a folder"),
+    count: option(int, "--count", help="Number of motions") = 10,
+    seed: setting("seed") = 0,
     records: Records = None,
     units: Units = None,
     dt: Dt = None,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+from itertools import product
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 import typer
@@ -27,8 +27,8 @@ from martths_jax.cli.motion_options import (
     Variable,
     load_all,
 )
-from martths_jax.cli.run_options import Indices, words
-from martths_jax.control.controllers import Controller
+from martths_jax.cli.options import Trial, option, required, setting
+from martths_jax.control.base import Controller
 from martths_jax.errors import argument_error
 from martths_jax.files import atomic, safe_name
 from martths_jax.indices import DEFAULT, choose
@@ -37,6 +37,7 @@ from martths_jax.indices.table import units_in_words
 from martths_jax.motions import available_motions
 from martths_jax.nominal import Comparison, compare_with_table4
 from martths_jax.plant import draw_plants, nominal_plant
+from martths_jax.published import COMPARED, PROPOSED
 from martths_jax.screen import ScreenTable
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import simulate
@@ -48,8 +49,7 @@ from martths_jax.study import make_config
 REAL = ("elcentro", "kobe", "morganhill")
 BUILT_IN = ("elcentro-like", "kobe-like", "morganhill-like")
 
-Fs = Annotated[float, typer.Option("--fs", help="Sampling rate [Hz].")]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of the plant and noise draws.")]
+Seed = setting("seed")
 
 
 def build_controller(given: str, benchmark: Benchmark) -> tuple[Controller, dict]:
@@ -84,23 +84,13 @@ def _like(value: float, printed: float) -> str:
 
 
 def run(
-    motion: Motions,
-    out: Annotated[Path, typer.Option("--out", help="Folder for signals.npz and indices.")],
-    controller: Annotated[
-        str,
-        typer.Option(
-            "--controller",
-            metavar="[NAME=]KIND[{KEY=VALUE,...}]",
-            help="lqg, adfc or passthrough, also with settings: 'adfc{nb=2048,no=2047}'.",
-        ),
-    ] = "adfc",
-    trial: Annotated[
-        int,
-        typer.Option("--trial", min=0, help="0 is the nominal plant, 1, 2, ... uncertain ones."),
-    ] = 0,
+    motion: required("motions"),
+    out: required("out", "a folder"),
+    controller: setting("controllers", PROPOSED) = None,
+    trial: Trial = 0,
     seed: Seed = 0,
-    fs: Fs = 1024,
-    integrator: Annotated[str, typer.Option(help="newmark, rk4 or zoh.")] = "newmark",
+    fs: setting("fs") = 1024.0,
+    integrator: setting("integrator") = "newmark",
     records: Records = None,
     scale: Scale = None,
     pga: Pga = None,
@@ -108,11 +98,9 @@ def run(
     units: Units = None,
     dt: Dt = None,
     variable: Variable = None,
-    resample: Resample = "linear",
-    indices: Indices = None,
-    mat: Annotated[
-        bool, typer.Option("--mat", help="Write all of it as a MATLAB file NAME.mat too.")
-    ] = False,
+    resample: Resample = None,
+    indices: setting("indices", "benchmark") = None,
+    matlab: option(bool, "--matlab", help="Write all of it as a MATLAB file NAME.mat too") = False,
 ) -> None:
     """Run one trial and save its signals and indices.
 
@@ -123,17 +111,18 @@ def run(
     """
     motions = load_all(motion, records, scale, pga, sa, units, resample, fs, dt, variable)
     benchmark = build_benchmark(fs, integrator)
-    drive, chosen = build_controller(controller, benchmark)
     plants = nominal_plant() if trial == 0 else draw_plants(1, seed, first=trial)
-    about = {"trial": trial, "seed": seed, "integrator": integrator, "settings": chosen}
-    evaluated = choose(words(indices) or DEFAULT)
+    drives = [build_controller(given, benchmark) for given in controller or PROPOSED]
+    evaluated = choose(indices or DEFAULT)
     lost = []
-    with progress(f"{drive.name}, trial {trial}", len(motions)) as tell:
-        for done, one in enumerate(motions, 1):
+    names = ", ".join(drive.name for drive, _ in drives)
+    with progress(f"{names}, trial {trial}", len(motions) * len(drives)) as tell:
+        for done, (one, (drive, chosen)) in enumerate(product(motions, drives), 1):
+            about = {"trial": trial, "seed": seed, "integrator": integrator, "settings": chosen}
             result = simulate(
                 benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True, indices=evaluated
             )
-            _save_run(out, one, drive.name, result, about, mat)
+            _save_run(out, one, drive.name, result, about, matlab)
             console.print(str(result), highlight=False)
             _print_indices(result)
             if result.lost[0]:
@@ -194,20 +183,17 @@ def _print_indices(result) -> None:
 
 def table4(
     records: Records = None,
-    motion: Annotated[
-        list[str] | None, typer.Option("--motion", help="Motions instead of the paper's three.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for table4.md and table4.csv.")
-    ] = None,
+    motion: Motions = None,
+    out: setting("out", "the screen only; else a folder") = None,
     seed: Seed = 0,
     scale: Scale = None,
     units: Units = None,
     dt: Dt = None,
     variable: Variable = None,
-    indices: Indices = None,
+    controller: setting("controllers", COMPARED) = None,
+    indices: setting("indices", "benchmark") = None,
 ) -> None:
-    """The 48 numbers of Table 4 (24 indices, LQG and ADFC, nominal plant) beside those in print.
+    """The numbers of Table 4 (24 indices, nominal plant) beside those in print.
 
     Uses El Centro, Kobe and Morgan Hill from --records (or $MARTHS_RECORDS), and the built-in
     motions that behave like them where those are not found.
@@ -217,10 +203,11 @@ def table4(
         raise argument_error("--motion", "name at least one motion", "none")
     motions = load_all(names, records, scale, units=units, dt=dt, variable=variable)
     benchmark = build_benchmark()
-    with progress("Table 4", 2 * len(motions)) as tell:
+    drives = [build_controller(given, benchmark)[0] for given in controller or COMPARED]
+    with progress("Table 4", len(drives) * len(motions)) as tell:
         found = compare_with_table4(
-            benchmark, motions, noise=SensorNoise(seed=seed), progress=tell,
-            indices=words(indices) or DEFAULT,
+            benchmark, motions, drives, noise=SensorNoise(seed=seed), progress=tell,
+            indices=indices or DEFAULT,
         )  # fmt: skip
     _print_comparison(found)
     if out:

@@ -2,71 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
 
 import jax
-import typer
 
-from martths_jax.campaign.given import split_list
+from martths_jax.campaign.config import read_toml
 from martths_jax.cli.console import error_console
-from martths_jax.indices import GROUPS
+from martths_jax.cli.options import option
+from martths_jax.indices import NAMES
 from martths_jax.study import Bars, Lines, Reporter
 
-Config = Annotated[
-    Path | None, typer.Option("--config", help="TOML file of a study; flags override it.")
-]
-Controllers = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--controllers",
-        "--controller",
-        metavar="[NAME=]KIND[{KEY=VALUE,...}]",
-        help="Controllers, separated by commas or repeated, such as lqg or "
-        "'slow=adfc{nb=2048,no=2047}'; adfc if left out.",
-    ),
-]
-Indices = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--indices",
-        metavar="NAMES",
-        help=f"What is evaluated, separated by commas or repeated: {', '.join(GROUPS)}, names such "
-        "as J2_1 or TI, package.module:NAME of your own; benchmark if left out.",
-    ),
-]
-MotionList = Annotated[str | None, typer.Option("--motions", help="Motions separated by commas.")]
-Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures.")]
-Devices = Annotated[
-    int | None, typer.Option("--devices", help="Devices to use; all, one a core, if left out.")
-]
-Memory = Annotated[
-    float | None, typer.Option("--memory", help="Bound on the memory of the noise [GB].")
-]
-AllowMixed = Annotated[
-    bool,
-    typer.Option("--allow-mixed", help="Mix results of machines whose last digits differ."),
-]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")]
+Config = option(
+    Path | None, "--config", metavar="FILE",
+    help="TOML file of a study, see init-config; options override it",
+)  # fmt: skip
+Figures = option(bool, "--figures/--no-figures", help="Draw figures")
+Fresh = option(bool, "--fresh", help="Start over: delete the run in the folder")
+AllowMixed = option(bool, "--allow-mixed", help="Mix results of machines whose last digits differ")
+Quiet = option(bool, "--quiet", help="Say nothing but errors")
 
 
-def words(texts: list[str] | None) -> list[str] | None:
-    """Words of options that may be repeated and hold several, separated by commas."""
-    if not texts:
-        return None
-    return [word for text in texts for word in split_list(text)]
+def shown_indices(default) -> type:
+    """Option for the indices that figures and summary show."""
+    return option(
+        list[str] | None, "--index", metavar="INDEX", default=", ".join(default),
+        help=f"Indices of figures and summary, {NAMES[0]} to {NAMES[-1]}; repeated or with commas",
+    )  # fmt: skip
 
 
-def given_settings(motions: list[str] | None, motion_list: str | None, **settings) -> dict:
-    """A study's settings that were given on the command line."""
-    asked = [*(motions or []), *(words([motion_list]) or [] if motion_list else [])]
-    lists = {name: words(settings.get(name)) for name in ("controllers", "indices")}
-    settings |= {"motions": asked or None} | lists
-    return {name: value for name, value in settings.items() if value is not None}
+def settings_of(config: Path | None, given: Mapping) -> dict:
+    """A study's settings by name: those given on the command line, else those of a file.
+
+    Raises:
+        InputError: a file that cannot be used.
+    """
+    return ({} if config is None else read_toml(config)) | dict(given)
 
 
-def set_devices(count: int) -> None:
+def set_devices(count: int | None) -> None:
     """Let JAX start so many CPU devices, if it has not started yet."""
+    if count is None or count < 1:  # what cannot be used is refused where it is
+        return
     try:
         jax.config.update("jax_num_cpu_devices", count)
     except RuntimeError:  # JAX runs already (a program that calls this command)
@@ -80,11 +58,16 @@ def reporter_for(quiet: bool) -> Reporter:
     return Bars(error_console) if error_console.is_terminal else Lines(error_console)
 
 
-def say_what_is_kept(folder) -> None:
-    """After Ctrl-C."""
-    error_console.print(
-        f"What is finished is kept in {folder}; repeat the command to go on.",
-        highlight=False,
-        soft_wrap=True,
-        markup=False,
-    )
+@contextmanager
+def kept(folder) -> Iterator[None]:
+    """After Ctrl-C, say that what is finished is kept in a folder."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        error_console.print(
+            f"What is finished is kept in {folder}; repeat the command to go on.",
+            highlight=False,
+            soft_wrap=True,
+            markup=False,
+        )
+        raise

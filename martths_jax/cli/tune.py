@@ -2,79 +2,122 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
 
-import typer
+import numpy as np
 
 from martths_jax.benchmark import VOLT_LIMIT, build_benchmark
+from martths_jax.campaign.config import as_settings, make_config
+from martths_jax.campaign.draws import make_draws
+from martths_jax.campaign.plan import study_motion
+from martths_jax.campaign.provenance import command_line
+from martths_jax.campaign.template import write_config
 from martths_jax.cli.console import console, error_console
-from martths_jax.cli.motion_options import Dt, Records, Scale, Units, Variable, load_all
+from martths_jax.cli.options import DRAWN, STUDY, one_of, option, takes
+from martths_jax.cli.run_options import Config, Fresh, Quiet, kept, set_devices, settings_of
 from martths_jax.errors import InputError
+from martths_jax.published import COMPARED
 from martths_jax.screen import ScreenTable
+from martths_jax.sensors import SensorNoise
 from martths_jax.text import counted
 from martths_jax.tune import Options
 from martths_jax.tune import tune as run_tuning
+from martths_jax.tune.descent import METHODS
+from martths_jax.tune.gradient import MODES
 from martths_jax.tune.report import write_report
 
+#: What a tuning has where a study has another default.
+DEFAULTS = {"trials": 32, "controllers": COMPARED[:1], "motions": ("elcentro-like",), "out": "tune",
+            "signals": False}  # fmt: skip
 
+
+@takes((*STUDY, *DRAWN), DEFAULTS)
 def tune(
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the results.")],
-    controller: Annotated[str, typer.Option("--controller", help="lqg or adfc.")] = "lqg",
-    objective: Annotated[
-        str, typer.Option("--objective", help="Sum of weighted indices, such as j2+0.5*j5+J8_26.")
-    ] = "j2+j5",
-    motions: Annotated[
-        list[str], typer.Option("--motions", help="What to tune on; may be repeated.")
-    ] = ["elcentro-like"],  # noqa: B006
-    check: Annotated[
-        str, typer.Option("--check", help="Motion of the final comparison, not tuned on.")
-    ] = "kobe-like",
-    records: Records = None,
-    scale: Scale = None,
-    units: Units = None,
-    dt: Dt = None,
-    variable: Variable = None,
-    plants: Annotated[int, typer.Option("--plants", help="Uncertain plants to tune on.")] = 32,
-    fresh: Annotated[int, typer.Option("--fresh-plants", help="Plants of the comparison.")] = 128,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of plants and noise.")] = 1,
-    steps: Annotated[int, typer.Option("--steps", help="Steps in all; a later call goes on.")] = 50,
-    rate: Annotated[float, typer.Option("--rate", help="Length of a step [decades].")] = 0.1,
-    patience: Annotated[
-        int, typer.Option("--patience", help="Stop after so many steps without 0.1 % gain.")
-    ] = 15,
-    start: Annotated[
-        list[str] | None, typer.Option("--start", metavar="NAME=VALUE", help="Start value.")
-    ] = None,
-    free: Annotated[
-        list[str] | None, typer.Option("--free", metavar="NAME", help="Tune only these [all].")
-    ] = None,
-    volts: Annotated[
-        float, typer.Option("--volts", help="Valve command where the penalty starts [V].")
-    ] = VOLT_LIMIT,
-    penalty: Annotated[
-        float, typer.Option("--penalty", help="Weight of the squared excess [1/V^2].")
-    ] = 10.0,
+    objective: option(
+        str, "--objective", help="Sum of weighted indices, such as j2+0.5*j5+J8_26"
+    ) = "j2+j5",
+    config: Config = None,
+    settings: dict | None = None,
+    check: option(
+        str,
+        "--check-motion",
+        "--check",
+        metavar="NAME|FILE",
+        help="Motion of the final comparison, not tuned on",
+    ) = "kobe-like",
+    check_trials: option(
+        int, "--check-trials", "--fresh-plants", help="Fresh plants of the final comparison"
+    ) = 128,
+    steps: option(int, "--steps", help="Evaluations in all; a later call goes on") = 50,
+    method: option(str, "--method", help=f"How it descends: {', '.join(METHODS)}") = "lbfgs",
+    rate: option(
+        float, "--rate", help="Length of the first step, with adam of every step [decades]"
+    ) = 0.1,
+    patience: option(int, "--patience", help="Stop after so many steps without 0.1 % gain") = 15,
+    start: option(
+        list[str] | None,
+        "--start",
+        metavar="NAME=VALUE",
+        help="Values to start from; repeated or with commas",
+    ) = None,
+    free: option(
+        list[str] | None,
+        "--free",
+        metavar="NAME",
+        default="all",
+        help="Numbers that are tuned; repeated or with commas",
+    ) = None,
+    volts: option(float, "--volts", help="Valve command where the penalty starts [V]") = VOLT_LIMIT,
+    penalty: option(float, "--penalty", help="Weight of the squared excess [1/V^2]") = 10.0,
+    mode: option(
+        str | None,
+        "--mode",
+        default="the cheaper one",
+        help=f"Mode of differentiation: {', '.join(MODES)}",
+    ) = None,
+    fresh: Fresh = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Tune LQG's weights or ADFC's lambda, and the filter's q, on a set of plants and motions."""
+    """Tune the numbers of a controller on a set of plants and motions, by gradients."""
+    study = make_config(DEFAULTS | settings_of(config, settings))
+    name = one_of("--controller", study.controllers)
+    table = dict(study.controller.get(name, {}))
     options = Options(
-        controller, objective, plants, seed, _starts(start), tuple(free or ()), steps, rate,
-        patience, volts, penalty,
+        name, objective, study.trials, study.seed, _starts(start), tuple(free or ()), steps, rate,
+        patience, volts, penalty, method, mode, tuple(table.items()),
     )  # fmt: skip
-    options.check()
+    _, controller = options.check()
+    motions = study.motions or DEFAULTS["motions"]
     if check in motions:
         raise InputError(
-            f"Option --check must name a motion that is not tuned on, but {check} is; give another."
+            f"Option --check-motion must name a motion that is not tuned on, but {check} is; give "
+            "another."
         )
-    if fresh < 1:
-        raise InputError(f"Option --fresh-plants must be at least 1, but got {fresh}.")
-    *tuned_on, unseen = load_all(
-        [*motions, check], records, scale, units=units, dt=dt, variable=variable
-    )
-    benchmark = build_benchmark()
-    state = run_tuning(benchmark, options, tuned_on, out, tell=_tell, notice=_notice)
-    rows = write_report(benchmark, controller, state, unseen, fresh, out)
-    console.print(_table(rows, controller, unseen.name, fresh))
+    if check_trials < 1:
+        raise InputError(f"Option --check-trials must be at least 1, but got {check_trials}.")
+    set_devices(study.devices)
+    *tuned_on, unseen = [study_motion(given, study) for given in (*motions, check)]
+    if not quiet:
+        for text in (text for motion in (*tuned_on, unseen) for text in motion.notices):
+            _notice(text)
+    benchmark = build_benchmark(study.fs, study.integrator, partition=study.partition)
+    draws = make_draws(study)
+    options = replace(options, trials=draws.trials)
+    noise = SensorNoise(study.noise_power, study.noise_shared, study.seed)
+    out = Path(study.out)
+    with kept(out):
+        state = run_tuning(
+            benchmark, options, tuned_on, out, plants=draws.plants(np.arange(1, draws.trials + 1)),
+            noise=noise, fresh=fresh, tell=(lambda row: None) if quiet else _tell, notice=_notice,
+            command_line=command_line(),
+        )  # fmt: skip
+    write_config(as_settings(replace(study, trials=draws.trials)), out / "config.toml",
+                 f"A tuning: `martths tune --config FILE --objective {objective}`.")  # fmt: skip
+    rows = write_report(benchmark, controller, state, unseen, check_trials, out, noise)
+    if quiet:
+        return
+    console.print(_table(rows, controller.name, unseen.name, check_trials))
     console.print(f"{state['ended'] or 'All steps done'}; results in {out}", soft_wrap=True)
 
 
@@ -90,10 +133,13 @@ def _starts(given) -> tuple[tuple[str, float], ...]:
 
 
 def _tell(row: dict) -> None:
-    skip = ("step", "accepted", "objective", "diverged", "length")
-    shown = [f"{n} {v:.3f}" for n, v in row.items() if n not in skip and not n.startswith("log10_")]
-    line = f"step {row['step']}: objective {row['objective']:.4f}; {', '.join(shown)}"
-    error_console.print(line if row["accepted"] else f"{line} (unstable: backed off)")
+    indices = [f"{n} {v:.3f}" for n, v in row.items() if n[0] == "J" and n[1:2].isdigit()]
+    line = f"step {row['step']}: objective {row['objective']:.4f}; {', '.join(indices)}"
+    if row["diverged"]:
+        line += " (unstable: backed off)"
+    elif not row["accepted"]:
+        line += " (a trial on the way)"
+    error_console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 def _notice(text: str) -> None:
@@ -104,7 +150,7 @@ def _table(rows: list[dict], controller: str, motion: str, plants: int) -> Scree
     heads = ("index", "start", "tuned", "published (nominal, mean of three records)")
     cells = []
     for row in rows:
-        published = f"{row['published']:.2f}" if row["published"] != "" else ""
+        published = f"{row['published']:.2f}" if row["published"] != "" else "–"
         cells.append((row["index"], f"{row['start']:.2f}", f"{row['tuned']:.2f}", published))
     title = f"{controller} on {motion}, medians of {counted(plants, 'fresh plant')}"
     return ScreenTable(title, heads, cells)

@@ -14,8 +14,8 @@ from martths_jax.figures.style import (
     motion_label,
     new_figure,
 )
-from martths_jax.plant import NOMINAL_HZ, frequency_response
 from martths_jax.text import counted
+from martths_jax.transfer import NOMINAL_HZ, frequency_response
 
 FREQUENCY = np.geomspace(0.1, 100.0, 160)  # Hz
 BANDS = ((5, 95, "0.86"), (25, 75, "0.70"))

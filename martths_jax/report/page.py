@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.session import read_provenance
 from martths_jax.figures import drawings, open_source
 from martths_jax.files import atomic
 from martths_jax.report.beside import beside_html
@@ -24,7 +25,6 @@ from martths_jax.report.payload import (
 )
 from martths_jax.report.tables import study_tables
 from martths_jax.study import Study
-from martths_jax.study.runner import read_provenance
 from martths_jax.study.summary import Table, summarise
 
 #: Resolution of the figures in the page.

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from martths_jax.campaign.assembly import Results
+from martths_jax.campaign.assembly import write_results as write_files
 from martths_jax.campaign.dataset import (
-    INDEX_UNITS,
-    STATUS_FLAGS,
+    ACTUATORS,
     attributes,
     index_names,
-    index_variables,
+    outcome_variables,
     read_results,
-    save_dataset,
 )
-from martths_jax.campaign.files import write_text, writing
 from martths_jax.campaign.plan import Plan
 from martths_jax.campaign.store import RunFolder
+from martths_jax.campaign.tables import Summary, Table
+from martths_jax.campaign.tidy import write_rows
 from martths_jax.sensitivity.design import Design
 from martths_jax.sensitivity.estimators import LEVEL, RESAMPLES, SobolIndices, sobol, verdicts
 from martths_jax.sensitivity.store import ROWS
-from martths_jax.study.summary import Summary, Table
-from martths_jax.text import counted, csv_field
+from martths_jax.text import counted
 
 ESTIMATES = ("first", "first_low", "first_high", "total", "total_low", "total_high")
 _WORDS = {
@@ -35,18 +34,13 @@ _WORDS = {
 }
 
 
-@dataclass(frozen=True)
-class Sensitivity:
-    """Results of a global sensitivity analysis.
+class Sensitivity(Results):
+    """Results of a global sensitivity analysis, ``sensitivity.nc``.
 
-    Attributes:
-        dataset: as in ``sensitivity.nc``: ``first``, ``total`` and the ends of their intervals
-            (controller, index, factor), ``note`` (controller, index), and the runs themselves.
-        folder: of the analysis.
+    ``first``, ``total`` and the ends of their intervals (controller, index, factor), ``note``
+    (controller, index), and the runs themselves: ``value`` (controller, sample, row, index) and so
+    on.
     """
-
-    dataset: xr.Dataset
-    folder: Path
 
     @property
     def notes(self) -> dict[tuple[str, str], str]:
@@ -101,11 +95,10 @@ def open_sensitivity(folder: str | Path) -> Sensitivity:
 
 
 def write_results(run: RunFolder, design: Design, plan: Plan) -> Sensitivity:
-    """``sensitivity.nc``, ``sensitivity.csv`` and ``summary.md``."""
+    """``sensitivity.nc``, ``sensitivity.csv``, ``summary.md`` and the configuration."""
     done = Sensitivity(assemble(run, design, plan), run.path)
-    save_dataset(done.dataset, run.path / "sensitivity.nc")
-    write_csv(done, run.path / "sensitivity.csv")
-    write_text(run.path / "summary.md", done.summary().markdown())
+    remark = "An analysis: `martths sensitivity --config FILE`; `trials` are its base samples."
+    write_files(run, "sensitivity", done.dataset, write_csv, done.summary(), remark)
     return done
 
 
@@ -114,10 +107,12 @@ def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
     names = list(plan.controllers)
     shape = design.unit.shape[:2]
     outcomes = [run.read(c, ROWS) for c in names]
-    value = np.stack([o.value.reshape(*shape, -1) for o in outcomes])
-    status = np.stack([o.status.reshape(shape) for o in outcomes])
-    found = [sobol(v, seed=plan.config.seed) for v in value]
     identity = run.header["identity"]
+
+    def gather(pick):
+        return np.stack([x.reshape(*shape, *x.shape[1:]) for x in map(pick, outcomes)])
+
+    found = [sobol(v, seed=plan.config.seed) for v in gather(lambda o: o.value)]
     notes = [list(verdicts(identity["indices"], f, design.samples).values()) for f in found]
     cell = ("controller", "index", "factor")
     variables = {
@@ -132,19 +127,16 @@ def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
         "used": ("controller", np.array([f.used for f in found], dtype=np.int32), {
             "long_name": "base samples whose runs all finished"}),
         "note": (cell[:2], np.array(notes), {"long_name": "what limits these indices"}),
-        "value": (("controller", "sample", "row", "index"), value, {
-            "long_name": "evaluation indices of every run; NaN where it diverged"} | INDEX_UNITS),
-        "status": (("controller", "sample", "row"), status, {
-            "long_name": "how the run ended"} | STATUS_FLAGS),
         "point": (("sample", "row", "factor"), design.unit, {
             "long_name": "points of the design in the unit cube", "units": "1"}),
-    } | index_variables(identity)  # fmt: skip
+    } | outcome_variables(identity, ("controller", "sample", "row"), gather)  # fmt: skip
     coordinates = {
         "controller": np.array(names),
         "index": np.array(identity["indices"]),
         "factor": np.array(design.factors),
         "row": np.array(["A", "B", *(f"AB {f}" for f in design.factors)]),
         "sample": np.arange(design.samples, dtype=np.int32),
+        "actuator": ACTUATORS,
     }
     about = attributes(run) | {
         "title": "Virtual multi-axial real-time hybrid simulation: global sensitivity",
@@ -163,19 +155,18 @@ def indices_of(sensitivity: Sensitivity, controller: str) -> SobolIndices:
     return SobolIndices(*columns, cell["mean"].values, cell.deviation.values, int(cell.used))
 
 
-def write_csv(found: Sensitivity, path: Path) -> None:
+def write_csv(dataset: xr.Dataset, path: Path) -> None:
     """One row a controller, index and factor; empty where the index does not vary."""
-    data = found.dataset
-    with writing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.write(",".join(["controller", "index", "factor", *ESTIMATES, "note"]) + "\n")
-        for c, controller in enumerate(data.controller.values):
-            for i, name in enumerate(data["index"].values):
-                for j, factor in enumerate(data.factor.values):
-                    numbers = [float(data[e].values[c, i, j]) for e in ESTIMATES]
-                    cells = ",".join("" if x != x else repr(x) for x in numbers)
-                    note = csv_field(str(data.note.values[c, i]))
-                    start = ",".join(map(csv_field, (str(controller), str(name), str(factor))))
-                    file.write(f"{start},{cells},{note}\n")
+    names = [dataset[d].values.tolist() for d in ("controller", "index", "factor")]
+    numbers = np.stack([dataset[name].values for name in ESTIMATES], axis=-1).tolist()
+    notes = dataset.note.values.tolist()
+    rows = (
+        [controller, name, factor, *numbers[c][i][j], notes[c][i]]
+        for c, controller in enumerate(names[0])
+        for i, name in enumerate(names[1])
+        for j, factor in enumerate(names[2])
+    )
+    write_rows(path, ["controller", "index", "factor", *ESTIMATES, "note"], rows)
 
 
 def summarise(found: Sensitivity) -> Summary:

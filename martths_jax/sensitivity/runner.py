@@ -1,19 +1,19 @@
-"""The analysis itself: the rows of the design in blocks, stored as they finish."""
+"""A sensitivity analysis: the rows of a design, chunk by chunk of base samples."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.cells import Batch, Block, Campaign
 from martths_jax.campaign.config import StudyConfig, make_config, read_toml, unknown_names
-from martths_jax.campaign.engine import Outcome, choose_devices
 from martths_jax.campaign.lanes import LaneEngine
-from martths_jax.campaign.memory import GB, choose_chunk, lane_bytes
 from martths_jax.campaign.plan import Plan, build_plan
-from martths_jax.campaign.progress import Reporter, Tally, compile_seconds
+from martths_jax.campaign.progress import Reporter, Tally
+from martths_jax.campaign.run import run_campaign
 from martths_jax.errors import argument_error, raise_all
 from martths_jax.indices import choose
 from martths_jax.indices.table import shown_of
@@ -23,11 +23,8 @@ from martths_jax.runtime import check_runtime
 from martths_jax.sensitivity.design import Design, is_power_of_two, make_design, most_samples
 from martths_jax.sensitivity.results import Sensitivity, write_results
 from martths_jax.sensitivity.store import ROWS, SensitivityFolder
-from martths_jax.simulation import LANES, Setup
-from martths_jax.study.runner import Session, header
 from martths_jax.sweep.config import SHOWN
 from martths_jax.text import counted
-from martths_jax.watch import Status
 
 #: What an analysis has where a study has another default.
 DEFAULTS = {"trials": 256, "controllers": PROPOSED, "out": "sensitivity", "signals": False}
@@ -70,27 +67,102 @@ def run_sensitivity(
     check_runtime()
     reporter = reporter or Reporter()
     plan, design, shown = build(config, shown, changes)
-    head = header(plan, command_line) | {"trials": design.rows - 1}
-    head["identity"] |= {"factors": list(design.factors)}
-    with SensitivityFolder.start(
-        Path(plan.config.out), head, fresh, allow_mixed=allow_mixed, notice=reporter.notice
-    ) as run:
-        engine = make_engine(plan, design, reporter)
-        session = Session(run, engine, command_line)
-        try:
-            run_rows(run, engine, design, reporter, session)
-        finally:
-            reporter.end()
-            session.save()
-        done = write_results(run, design, plan)
+    return run_campaign(
+        Rows(plan, design, shown if figures else ()), reporter=reporter, fresh=fresh,
+        allow_mixed=allow_mixed, command_line=command_line,
+    )  # fmt: skip
+
+
+class Rows(Campaign):
+    """The rows of a design for each controller; those of all motions are stored together.
+
+    Args:
+        plan: of the study behind it.
+        design: the rows.
+        shown: indices of the figures; none: no figures.
+    """
+
+    folder = SensitivityFolder
+
+    def __init__(self, plan: Plan, design: Design, shown: tuple[str, ...] = ()):
+        super().__init__(plan)
+        self.design, self.shown = design, shown
+        self.motion = design.motions(len(plan.motions))
+
+    def header(self, command_line):
+        head = super().header(command_line) | {"trials": self.design.rows - 1}
+        head["identity"] |= {"factors": list(self.design.factors)}
+        return head
+
+    @property
+    def extent(self):
+        d, rows = len(self.design.factors), self.design.rows
+        return (
+            f"N = {self.design.samples} base samples x (d + 2) = {d + 2} rows = {rows} runs of "
+            f"{counted(len(self.plan.controllers), 'controller')} each"
+        )
+
+    def pace(self, engine):
+        return f"in chunks of {counted(engine.chunk, 'base sample')}"
+
+    def engine_on(self, devices, lanes):
+        return LaneEngine(self.plan, devices, max(1, min(CHUNK, lanes // 2)), self.samples)
+
+    def noise_lanes(self, engine):
+        return 2 * engine.chunk  # each base sample sees two realisations
+
+    def rows_of(self, engine):
+        return self.design.unit.shape[1] * engine.chunk
+
+    def batches(self):
+        return [OneController(self, controller) for controller in self.plan.controllers]
+
+    def tallies(self, asked, left):
+        found = {}
+        for i, motion in enumerate(self.plan.motions):
+            mine = asked & (self.motion == i)
+            for controller in self.plan.controllers:
+                waiting = left[controller, ROWS] & mine
+                done = int(mine.sum() - waiting.sum())
+                found[controller, motion.name] = Tally(int(mine.sum()), done)
+        return found
+
+    def finish(self, run, engine, reporter):
+        done = write_results(run, self.design, self.plan)
         for text in done.warnings:
             reporter.notice(text)
-        if figures:
+        if self.shown:
             from martths_jax.sensitivity.figures import draw_figures
 
-            draw_figures(done, run.path / "figures", shown)
-        session.save()
+            draw_figures(done, run.path / "figures", self.shown)
         return done
+
+
+class OneController(Batch):
+    """A controller under all rows: lanes in the order of the design, blocks motion by motion."""
+
+    def __init__(self, campaign: Rows, controller: str):
+        self.campaign, self.controller = campaign, controller
+        self.cells = ((controller, ROWS),)
+
+    def blocks(self, engine, chunk):
+        campaign, config = self.campaign, self.campaign.plan.config
+        streams = campaign.design.streams()
+        engine.store.load(streams[chunk])
+        for i, motion in enumerate(campaign.plan.motions):
+            mine = np.flatnonzero(campaign.motion[chunk] == i)
+            for start in range(0, mine.size, engine.block):
+                lanes = mine[start : start + engine.block]
+                rows = chunk[lanes]
+                run = partial(
+                    engine.run_lanes,
+                    engine.setup(self.controller, motion.name),
+                    np.zeros(rows.size, int),
+                    campaign.design.plants(rows, config.spread),
+                    streams[rows],
+                    np.full(rows.size, config.noise_power),
+                )
+                yield Block((self.controller, motion.name), lanes, run)
 
 
 def build(config, shown: Iterable[str], changes: dict) -> tuple[Plan, Design, tuple[str, ...]]:
@@ -126,80 +198,3 @@ def build(config, shown: Iterable[str], changes: dict) -> tuple[Plan, Design, tu
     design = make_design(study.trials, len(plan.motions), study.seed)
     check_plants(design.plants(np.arange(design.rows), study.spread))
     return plan, design, shown
-
-
-def make_engine(plan: Plan, design: Design, reporter: Reporter) -> LaneEngine:
-    """Engine on as many devices as memory allows; says how much there is to run."""
-    samples = max(m.acceleration.size for m in plan.motions)
-    devices = choose_devices(plan.config.devices)
-    count, lanes = choose_chunk(
-        samples, plan.noise.channels, LANES, len(devices), plan.config.memory_gb
-    )
-    chunk = max(1, min(CHUNK, lanes // 2))
-    engine = LaneEngine(plan, devices[:count], chunk, samples)
-    d = len(design.factors)
-    reporter.notice(
-        f"Seed {plan.config.seed}; N = {design.samples} base samples x (d + 2) = {d + 2} rows = "
-        f"{design.rows} runs of {counted(len(plan.controllers), 'controller')} each on "
-        f"{counted(count, f'{devices[0].platform} device')}, about "
-        f"{2 * chunk * lane_bytes(samples, plan.noise.channels) / GB:.2g} GB."
-    )
-    for text in plan.notices:
-        reporter.notice(text)
-    return engine
-
-
-def run_rows(run, engine: LaneEngine, design: Design, reporter: Reporter, session) -> None:
-    """Run whatever rows are not stored yet: chunks of base samples, motion by motion."""
-    plan = engine.plan
-    motions = [m.name for m in plan.motions]
-    motion, streams = design.motions(len(motions)), design.streams()
-    done = {c: run.done(c, ROWS, reporter.notice) for c in plan.controllers}
-    reporter.begin({
-        (c, name): Tally(int(np.sum(motion == i)), int(np.sum(done[c] & (motion == i))))
-        for i, name in enumerate(motions) for c in plan.controllers
-    })  # fmt: skip
-    each = design.unit.shape[1] * engine.chunk
-    for first in range(0, design.rows, each):
-        rows = np.arange(first, min(first + each, design.rows))
-        for controller in plan.controllers:
-            left = ~done[controller][rows]
-            if not left.any():
-                continue
-            engine.store.load(streams[rows])
-            parts, order = [], []
-            for i, name in enumerate(motions):
-                mine = rows[motion[rows] == i]
-                if mine.size:
-                    setup = engine.setup(controller, name)
-                    parts += _run_motion(
-                        engine, setup, design, mine, streams, (controller, name), reporter, session
-                    )
-                    order.append(mine)
-            outcome = Outcome.join(parts)[np.argsort(np.concatenate(order))]
-            run.write(controller, ROWS, rows[left], outcome[left])
-
-
-def _run_motion(
-    engine: LaneEngine, setup: Setup, design, rows, streams, key, reporter, session
-) -> list[Outcome]:
-    """Outcomes of rows under one motion, block after block."""
-    config, outcomes = engine.plan.config, []
-    for start in range(0, rows.size, engine.block):
-        mine = rows[start : start + engine.block]
-        began, compiled = time.monotonic(), compile_seconds()
-        reporter.working(key, compiling=start == 0)
-        outcome = engine.run_lanes(
-            setup,
-            np.zeros(mine.size, int),
-            design.plants(mine, config.spread),
-            streams[mine],
-            np.full(mine.size, config.noise_power),
-        )
-        outcomes.append(outcome)
-        session.about["trials"] += int(mine.size)
-        failed = int(np.sum(outcome.status >= Status.DIVERGED))
-        reporter.advance(
-            key, mine.size, failed, time.monotonic() - began, compile_seconds() - compiled
-        )
-    return outcomes

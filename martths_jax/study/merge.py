@@ -13,10 +13,11 @@ from martths_jax.campaign.files import write_text, writing
 from martths_jax.campaign.machine import MIXED_NOTE
 from martths_jax.campaign.plan import FILES, build_plan
 from martths_jax.campaign.progress import Reporter
+from martths_jax.campaign.session import read_provenance
 from martths_jax.campaign.store import PLANTS, RunFolder
 from martths_jax.errors import InputError, raise_all
 from martths_jax.study.results import Study
-from martths_jax.study.runner import finish, make_engine, read_provenance
+from martths_jax.study.runner import MonteCarlo, finish
 
 
 def merge_runs(
@@ -119,7 +120,7 @@ def engine_again(run: RunFolder, records: str | None, keep, reporter: Reporter):
         skip = {"draws"}  # a stored table of plants stands in for the way it was made
         raise_all(provenance.differences(*({k: v for k, v in d.items() if k not in skip}
                                            for d in (given, asked))))  # fmt: skip
-        return make_engine(plan, reporter)
+        return MonteCarlo(plan).make_engine(reporter)
     except InputError as error:
         reporter.notice(f"No signals are stored, since the study cannot be run again here: {error}")
         return None

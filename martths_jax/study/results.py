@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from martths_jax.campaign.assembly import Results
 from martths_jax.campaign.dataset import read_dataset, read_results
 from martths_jax.errors import InputError
 from martths_jax.study.signals import group
@@ -16,26 +16,12 @@ from martths_jax.text import counted
 from martths_jax.watch import Status
 
 
-@dataclass(frozen=True)
-class Study:
-    """Results of a study.
-
-    Attributes:
-        dataset: as in ``study.nc``: ``value`` (controller, motion, trial, index) and so on.
-        folder: of the run.
-    """
-
-    dataset: xr.Dataset
-    folder: Path
+class Study(Results):
+    """Results of a study, ``study.nc``: ``value`` (controller, motion, trial, index) and so on."""
 
     def summary(self) -> Summary:
         """Percentiles, paired comparison and Table 4 as tables; ``str`` of it is Markdown."""
         return summarise(self.dataset)
-
-    @property
-    def failed(self) -> int:
-        """Number of runs (controller, motion, trial) that diverged."""
-        return int(np.sum(self.dataset.status.values >= Status.DIVERGED))
 
     @property
     def failures(self) -> list[tuple[str, str, int]]:

@@ -224,17 +224,7 @@ def lines(sweep: Sweep, axis: Axis, motion: str, shown: Sequence[str]) -> Drawin
         panel.plot(values[order], middle, marker=shape["marker"], ms=2.4, **line(position))
         for value, e in zip(axis.values, shares, strict=True):
             add(controller, "lost", "", value, e.value, e.low, e.high, e.trials)
-    for panel, name in zip(axes, [*shown, "lost"], strict=False):
-        label = "lost trials [%]"
-        if name != "lost":
-            label = f"{index_label(name)} [{unit_of(sweep.dataset, name)}]"
-        panel.set_ylabel(label)
-        panel.set_xlabel(_axis_label(axis))
-        if _is_logarithmic(values):
-            panel.set_xscale("log")
-    axes[len(shown)].set_ylim(bottom=0, top=max(1.0, axes[len(shown)].get_ylim()[1]))
-    for panel in axes[panels:]:
-        panel.set_visible(False)
+    _name_panels(axes, [f"{index_label(n)} [{unit_of(sweep.dataset, n)}]" for n in shown], axis)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)))
     caption = (
@@ -243,6 +233,19 @@ def lines(sweep: Sweep, axis: Axis, motion: str, shown: Sequence[str]) -> Drawin
         "bootstrap confidence bands; the last panel has the share of lost trials."
     )
     return Drawing(figure, table, caption)
+
+
+def _name_panels(axes, labels: list[str], axis: Axis) -> None:
+    """Label the panels of indices and, behind them, that of lost trials; hide the others."""
+    for panel, label in zip(axes, [*labels, "lost trials [%]"], strict=False):
+        panel.set_ylabel(label)
+        panel.set_xlabel(_axis_label(axis))
+        if _is_logarithmic(np.array(axis.values, dtype=float)):
+            panel.set_xscale("log")
+    lost = axes[len(labels)]
+    lost.set_ylim(bottom=0, top=max(1.0, lost.get_ylim()[1]))
+    for panel in axes[len(labels) + 1 :]:
+        panel.set_visible(False)
 
 
 def _is_logarithmic(values: np.ndarray) -> bool:

@@ -4,47 +4,35 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from martths_jax.campaign.assembly import Results
+from martths_jax.campaign.assembly import write_results as write_files
 from martths_jax.campaign.dataset import (
-    INDEX_UNITS,
-    STATUS_FLAGS,
+    ACTUATORS,
     attributes,
-    count_variables,
     index_names,
-    index_variables,
+    outcome_variables,
     read_results,
-    save_dataset,
 )
-from martths_jax.campaign.engine import FIRSTS
-from martths_jax.campaign.files import write_text, writing
 from martths_jax.campaign.statistics import percentile
 from martths_jax.campaign.store import RunFolder
+from martths_jax.campaign.tables import Summary, Table, extent, number
+from martths_jax.campaign.tidy import write_runs
 from martths_jax.indices.table import shown_of
 from martths_jax.plant import PARAMETERS
-from martths_jax.study.summary import Summary, Table, extent, number
 from martths_jax.sweep.axes import Axis, Scalar
 from martths_jax.sweep.config import SHOWN, SweepConfig
 from martths_jax.sweep.grid import cell_numbers
-from martths_jax.text import counted, csv_field
+from martths_jax.text import counted
 from martths_jax.watch import Status
 
 
-@dataclass(frozen=True)
-class Sweep:
-    """Results of a sweep.
-
-    Attributes:
-        dataset: as in ``sweep.nc``: ``value`` (axes ..., controller, motion, trial, index) etc.
-        folder: of the sweep.
-    """
-
-    dataset: xr.Dataset
-    folder: Path
+class Sweep(Results):
+    """Results of a sweep, ``sweep.nc``: ``value`` (axes ..., controller, motion, trial, index)."""
 
     @property
     def axes(self) -> tuple[Axis, ...]:
@@ -64,8 +52,8 @@ class Sweep:
 
     @property
     def lost(self) -> int:
-        """Number of runs (cell, controller, motion, trial) that diverged."""
-        return int(np.sum(self.dataset.status.values >= Status.DIVERGED))
+        """``failed``."""
+        return self.failed
 
     def statistics(self, index: str, percent: float) -> xr.DataArray:
         """A percentile of an index over the uncertain trials that finished (NaN: none did).
@@ -105,11 +93,14 @@ def open_sweep(folder: str | Path) -> Sweep:
 
 
 def write_results(run: RunFolder, config: SweepConfig) -> Sweep:
-    """``sweep.nc``, ``sweep.csv`` and ``summary.md``."""
+    """``sweep.nc``, ``sweep.csv``, ``summary.md`` and the configuration of the study behind it."""
     done = Sweep(assemble(run, config), run.path)
-    save_dataset(done.dataset, run.path / "sweep.nc")
-    write_csv(done, run.path / "sweep.csv")
-    write_text(run.path / "summary.md", done.summary(config.shown).markdown())
+    axes = " ".join(f"{a.name}={','.join(map(repr, a.values))}" for a in config.axes)
+    remark = (
+        "The study that a sweep repeats: `martths sweep --config FILE --axis NAME=VALUES ...`\n"
+        f"with these axes: {axes}"
+    )
+    write_files(run, "sweep", done.dataset, write_csv, done.summary(config.shown), remark)
     return done
 
 
@@ -137,24 +128,12 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         return values.reshape(*grid.shape, *values.shape[1:])
 
     cell = (*names, "controller", "motion", "trial")
-    variables = {
-        "value": ((*cell, "index"), gather(lambda o: o.value), {
-            "long_name": "evaluation indices; NaN where the trial diverged"} | INDEX_UNITS),
-        "status": (cell, gather(lambda o: o.status), {
-            "long_name": "how the trial ended"} | STATUS_FLAGS),
-        "volt_peak": ((*cell, "actuator"), gather(lambda o: o.volt_peak), {
-            "long_name": "largest valve command", "units": "V"}),
-    }  # fmt: skip
     identity = run.header["identity"]
-    variables |= index_variables(identity) | count_variables(identity, cell, gather)
+    variables = outcome_variables(identity, cell, gather)
     variables["draw"] = (("trial", "parameter"), run.draws().plants(
         np.arange(run.trials + 1)).draws, {
             "long_name": "standard normal draws of the plant, before any spread", "units": "1"},
     )  # fmt: skip
-    for i, name in enumerate(FIRSTS):
-        variables[f"first_{name}"] = ((*cell, "actuator"), gather(lambda o, i=i: o.first[:, i]), {
-            "long_name": f"first sample of `{name}` (see Watch); NaN = never",
-            "units": "samples"})  # fmt: skip
     for name, (values, text, unit) in cell_numbers(grid, config.study).items():
         words = {"long_name": f"{text} of a cell; NaN for a controller without", "units": unit}
         variables[name] = ((*names, "controller"), values, words)
@@ -167,8 +146,8 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         "controller": np.array(list(grid.jobs)),
         "motion": np.array(motions),
         "trial": np.arange(run.trials + 1, dtype=np.int32),
-        "index": np.array(run.header["identity"]["indices"]),
-        "actuator": np.array([1, 2], dtype=np.int32),
+        "index": np.array(identity["indices"]),
+        "actuator": ACTUATORS,
         "parameter": np.array(PARAMETERS),
     }  # fmt: skip
     about = attributes(run) | {
@@ -179,29 +158,12 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, about)
 
 
-def write_csv(sweep: Sweep, path: Path) -> None:
+def write_csv(dataset: xr.Dataset, path: Path) -> None:
     """One row a cell, controller, motion and trial: axes, status, counts, indices.
 
     Numbers have all their digits; an index of a trial that diverged is empty.
     """
-    data, axes = sweep.dataset, sweep.axes
-    words = {int(s): s.name.lower() for s in Status}
-    counts = list(json.loads(data.attrs["counts"]))
-    heads = [*(a.name for a in axes), "controller", "motion", "trial", "status", *counts,
-             *index_names(data)]  # fmt: skip
-    with writing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.write(",".join(heads) + "\n")
-        for place in np.ndindex(*data.value.shape[:-2]):
-            values = [repr(a.values[i]) for a, i in zip(axes, place, strict=False)]
-            names = [str(data.controller.values[place[-2]]), str(data.motion.values[place[-1]])]
-            start = ",".join([*values, *map(csv_field, names)])
-            numbers = [data[name].values[place].tolist() for name in counts]
-            for trial, status, *counted, row in zip(
-                data.trial.values, data.status.values[place], *numbers,
-                data.value.values[place].tolist(), strict=True,
-            ):  # fmt: skip
-                cells = ["" if x != x else repr(x) for x in (*counted, *row)]
-                file.write(",".join([f"{start},{trial},{words[int(status)]}", *cells]) + "\n")
+    write_runs(dataset, path, before=list(json.loads(dataset.attrs["counts"])))
 
 
 def summarise(sweep: Sweep, shown: tuple[str, ...]) -> Summary:

@@ -1,32 +1,30 @@
-"""The sweep itself: batches of cells that share a program, stored cell by cell."""
+"""A sweep: batches of cells that share a program, each stored by itself."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.cells import Batch, Block, Campaign
 from martths_jax.campaign.config import StudyConfig
 from martths_jax.campaign.draws import Draws
-from martths_jax.campaign.engine import Outcome, choose_devices
 from martths_jax.campaign.lanes import LaneEngine, Worlds
-from martths_jax.campaign.memory import GB, choose_chunk, lane_bytes
 from martths_jax.campaign.plan import Plan, build_controller, build_plan, motion_identity
-from martths_jax.campaign.progress import Reporter, Tally, compile_seconds
+from martths_jax.campaign.progress import Reporter
+from martths_jax.campaign.run import run_campaign
 from martths_jax.errors import InputError, raise_all
 from martths_jax.plant import check_plants
 from martths_jax.runtime import check_runtime
-from martths_jax.simulation import LANES, Setup, prepare
-from martths_jax.study.runner import Session, header
+from martths_jax.simulation import Setup, prepare
 from martths_jax.sweep.config import SHOWN, SweepConfig, make_sweep
 from martths_jax.sweep.grid import Job, job_config
 from martths_jax.sweep.results import Sweep, write_results
 from martths_jax.sweep.store import SweepFolder, sweep_identity
 from martths_jax.text import counted
-from martths_jax.watch import Status
 
 #: Trials that are run together in every cell of a batch, so that their noise is drawn once.  The
 #: same whatever is done already: which lanes share a block does not depend on interruptions.
@@ -69,31 +67,113 @@ def run_sweep(
     check_runtime()
     if not isinstance(axes, SweepConfig):
         axes = make_sweep(axes, config, shown=shown, **changes)
-    sweep, reporter = axes, reporter or Reporter()
-    base, worlds, ready = build(sweep)
-    folder = Path(sweep.study.out)
-    head = header(base, command_line)
-    head["identity"] |= sweep_identity(sweep) | {"rates": _rates(sweep, worlds)}
-    head["config"] |= sweep_identity(sweep)
-    with SweepFolder.start(
-        folder, head, fresh, allow_mixed=allow_mixed, notice=reporter.notice
-    ) as run:
-        run.keep_draws(base.draws)
-        engine = make_engine(base, worlds, sweep, reporter)
-        session = Session(run, engine, command_line)
-        try:
-            run_jobs(run, engine, sweep, worlds, ready, reporter, session)
-        finally:
-            reporter.end()
-            session.save()
-        done = write_results(run, sweep)
-        if figures:
+    return run_campaign(
+        GridOfStudies(axes, figures), reporter=reporter or Reporter(), fresh=fresh,
+        allow_mixed=allow_mixed, command_line=command_line,
+    )  # fmt: skip
+
+
+class GridOfStudies(Campaign):
+    """The cells of a sweep: each controller's jobs under every motion.
+
+    Args:
+        sweep: what is swept.
+        figures: draw them.
+    """
+
+    folder = SweepFolder
+
+    def __init__(self, sweep: SweepConfig, figures: bool = True):
+        base, self.worlds, self.ready = build(sweep)
+        super().__init__(base)
+        self.sweep, self.figures = sweep, figures
+        self.jobs = {job.label: job for batch in sweep.grid.batches() for job in batch}
+
+    @property
+    def keys(self):
+        return [(c, m.name) for m in self.plan.motions for c in self.sweep.grid.jobs]
+
+    def key_of(self, cell):
+        return self.jobs[cell[0]].controller, cell[1]
+
+    @property
+    def samples(self):
+        rates = self.sweep.axis("fs") or (self.plan.config.fs,)
+        return max(m.acceleration.size for fs in rates for m in self.worlds.motions(fs, None))
+
+    @property
+    def notices(self):
+        return [
+            f"{controller} has not all of the axes: its {len(jobs)} cells make "
+            f"{counted(len(set(jobs)), 'distinct one')}, and each is run once."
+            for controller, jobs in self.sweep.grid.jobs.items()
+            if len(set(jobs)) < len(jobs)
+        ] + super().notices
+
+    def header(self, command_line):
+        head = super().header(command_line)
+        axes = sweep_identity(self.sweep)
+        head["identity"] |= axes | {"rates": _rates(self.sweep, self.worlds)}
+        head["config"] |= axes
+        return head
+
+    @property
+    def extent(self):
+        runs = len(self.jobs) * len(self.plan.motions) * (self.plan.trials + 1)
+        return f"{counted(len(self.sweep.grid.places), 'cell')}, {runs} runs"
+
+    def pace(self, engine):
+        batches = self.sweep.grid.batches()
+        return f"{counted(len(batches), 'batch', 'batches')} of cells a motion"
+
+    def engine_on(self, devices, lanes):
+        return LaneEngine(self.plan, devices, min(lanes, CHUNK), self.samples)
+
+    def batches(self):
+        return [
+            CellsBeside(self, jobs, motion.name)
+            for jobs in self.sweep.grid.batches()
+            for motion in self.plan.motions
+        ]
+
+    def finish(self, run, engine, reporter):
+        done = write_results(run, self.sweep)
+        if self.figures:
             from martths_jax.sweep.figures import draw_figures
 
             reporter.notice("Drawing the figures.")
-            draw_figures(done, folder / "figures", sweep.shown)
-        session.save()
+            draw_figures(done, run.path / "figures", self.sweep.shown)
         return done
+
+
+class CellsBeside(Batch):
+    """Jobs that share a program, under one motion: lanes cell after cell."""
+
+    def __init__(self, campaign: GridOfStudies, jobs: list[Job], motion: str):
+        self.campaign, self.jobs, self.motion = campaign, jobs, motion
+        self.cells = tuple((job.label, motion) for job in jobs)
+
+    def setup(self) -> Setup:
+        """Common surroundings of the cells, with their controllers one a cell."""
+        worlds, job = self.campaign.worlds, self.jobs[0]
+        fs, scale = job.get("fs", worlds.config.fs), job.get("scale")
+        benchmark = worlds.benchmark(fs, job.get("alpha"), job.get("p"))
+        controllers = [self.campaign.ready[job] for job in self.jobs]
+        prepared, own = prepare(controllers, benchmark, len(self.jobs))
+        ground = worlds.ground(benchmark, fs, scale, self.motion)
+        return Setup(benchmark, prepared, own, *ground)
+
+    def blocks(self, engine, chunk):
+        study, job = self.campaign.sweep.study, self.jobs[0]
+        plants = _draws(self.campaign.plan.draws, job.get("spread")).plants(chunk)
+        power = np.array([j.get("noise_power", study.noise_power) for j in self.jobs])
+        setup = self.setup()
+        engine.store.load(chunk)
+        for start in range(0, len(self.jobs) * chunk.size, engine.block):
+            lanes = np.arange(start, min(start + engine.block, len(self.jobs) * chunk.size))
+            cell, row = np.divmod(lanes, chunk.size)
+            run = partial(engine.run_lanes, setup, cell, plants[row], chunk[row], power[cell])
+            yield Block((job.controller, self.motion), lanes, run)
 
 
 def build(sweep: SweepConfig) -> tuple[Plan, Worlds, dict[Job, object]]:
@@ -142,126 +222,3 @@ def _rates(sweep: SweepConfig, worlds: Worlds) -> dict:
         f"{fs:g} Hz": {m.name: motion_identity(m) for m in worlds.motions(fs, None)}
         for fs in sweep.axis("fs") or ()
     }
-
-
-def make_engine(base: Plan, worlds: Worlds, sweep: SweepConfig, reporter: Reporter) -> LaneEngine:
-    """Engine on as many devices as memory allows."""
-    rates = sweep.axis("fs") or (base.config.fs,)
-    samples = max(m.acceleration.size for fs in rates for m in worlds.motions(fs, None))
-    devices = choose_devices(base.config.devices)
-    channels = base.noise.channels
-    count, chunk = choose_chunk(samples, channels, LANES, len(devices), base.config.memory_gb)
-    engine = LaneEngine(base, devices[:count], min(chunk, CHUNK), samples)
-    batches = sweep.grid.batches()
-    runs = sum(map(len, batches)) * len(base.motions) * (base.trials + 1)
-    reporter.notice(
-        f"Seed {base.config.seed}; {counted(len(sweep.grid.places), 'cell')}, "
-        f"{runs} runs on {counted(count, f'{devices[0].platform} device')}, "
-        f"{counted(len(batches), 'batch', 'batches')} of cells a motion, about "
-        f"{engine.chunk * lane_bytes(samples, channels) / GB:.2g} GB."
-    )
-    for controller, jobs in sweep.grid.jobs.items():
-        if len(set(jobs)) < len(jobs):
-            reporter.notice(
-                f"{controller} has not all of the axes: its {len(jobs)} cells make "
-                f"{counted(len(set(jobs)), 'distinct one')}, and each is run once."
-            )
-    for text in base.notices:
-        reporter.notice(text)
-    return engine
-
-
-def run_jobs(run, engine: LaneEngine, sweep: SweepConfig, worlds, ready, reporter, session) -> None:
-    """Run whatever is not stored yet, batch by batch of cells, chunk by chunk of trials."""
-    trials, batches = run.trials + 1, sweep.grid.batches()
-    motions = [m.name for m in engine.plan.motions]
-    done = {
-        (job, m): run.done(job.label, m, reporter.notice)
-        for batch in batches for job in batch for m in motions
-    }  # fmt: skip
-    cells = {(c, m): Tally(0, 0) for m in motions for c in sweep.grid.jobs}
-    for (job, motion), finished in done.items():
-        tally = cells[job.controller, motion]
-        tally.total += trials
-        tally.done += int(finished.sum())
-    reporter.begin(cells)
-    for first in range(0, trials, engine.chunk):
-        chunk = np.arange(first, min(first + engine.chunk, trials))
-        for batch in batches:
-            controllers = [ready[job] for job in batch]
-            for motion in motions:
-                left = [~done[job, motion][chunk] for job in batch]
-                if any(map(np.any, left)):
-                    setup = _setup(batch, controllers, worlds, motion)
-                    part = Part(run, engine, setup, batch, motion, chunk, left)
-                    part.run(sweep.study, reporter, session)
-
-
-def _setup(batch: list[Job], controllers: list, worlds: Worlds, motion: str) -> Setup:
-    """Common surroundings of a batch, with its controllers one a cell."""
-    fs, scale = batch[0].get("fs", worlds.config.fs), batch[0].get("scale")
-    benchmark = worlds.benchmark(fs, batch[0].get("alpha"), batch[0].get("p"))
-    prepared, own = prepare(controllers, benchmark, len(batch))
-    return Setup(benchmark, prepared, own, *worlds.ground(benchmark, fs, scale, motion))
-
-
-class Part:
-    """A batch of cells under one motion and a chunk of trials: lanes cell after cell.
-
-    Args:
-        run, engine: where results go and what runs.
-        setup: the cells.
-        jobs: one a cell.
-        motion: its name.
-        chunk: (T,) trials.
-        left: for each cell, (T,) trials that are not stored yet.
-    """
-
-    def __init__(self, run, engine: LaneEngine, setup: Setup, jobs, motion, chunk, left):
-        self.store, self.engine, self.setup = run, engine, setup
-        self.jobs, self.motion, self.chunk, self.left = jobs, motion, chunk, left
-
-    def run(self, study: StudyConfig, reporter: Reporter, session) -> None:
-        """Run the blocks that hold something missing; store a cell when its last block is done."""
-        T, size = self.chunk.size, self.engine.block
-        cell = np.repeat(np.arange(len(self.jobs)), T)
-        trial = np.tile(self.chunk, len(self.jobs))
-        wanted = np.concatenate(self.left)
-        power = np.array([job.get("noise_power", study.noise_power) for job in self.jobs])
-        draws = _draws(self.engine.plan.draws, self.jobs[0].get("spread"))
-        plants = draws.plants(self.chunk)
-        self.engine.store.load(self.chunk)
-        outcomes: dict[int, Outcome] = {}
-        stored = 0
-        for start in range(0, cell.size, size):
-            lanes = np.arange(start, min(start + size, cell.size))
-            if np.any(wanted[lanes]):
-                began, compiled = time.monotonic(), compile_seconds()
-                key = self.jobs[0].controller, self.motion
-                reporter.working(key, compiling=start == 0)
-                outcomes[start] = self.engine.run_lanes(
-                    self.setup, cell[lanes], plants[lanes % T], trial[lanes], power[cell[lanes]]
-                )
-                news = wanted[lanes]
-                failed = int(np.sum(outcomes[start].status[news] >= Status.DIVERGED))
-                spent = time.monotonic() - began
-                compiled = compile_seconds() - compiled
-                session.about["trials"] += int(news.sum())
-                reporter.advance(key, int(news.sum()), failed, spent, compiled)
-            while stored < len(self.jobs) and (stored + 1) * T <= lanes[-1] + 1:
-                self._write(stored, outcomes, size)
-                stored += 1
-
-    def _write(self, i: int, outcomes: dict[int, Outcome], size: int) -> None:
-        left = self.left[i]
-        if not left.any():
-            return
-        T = self.chunk.size
-        lanes = i * T + np.flatnonzero(left)
-        pieces = [
-            outcomes[start][lanes[lanes // size == start // size] - start]
-            for start in range(i * T // size * size, (i + 1) * T, size)
-            if np.any(lanes // size == start // size)
-        ]
-        job = self.jobs[i]
-        self.store.write(job.label, self.motion, self.chunk[left], Outcome.join(pieces))

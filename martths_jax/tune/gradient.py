@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from copy import copy
 
 import jax
@@ -21,12 +22,19 @@ from martths_jax.runtime import check_runtime, compiler_options
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import draw_noise, reference_response
 from martths_jax.tune.objective import Objective
-from martths_jax.tune.parameters import build
+from martths_jax.tune.parameters import Tuned, tuned
 from martths_jax.watch import Status
 
-#: Controllers whose gradient is taken in forward mode: ADFC has two numbers, for which it is faster
-#: and compiles in half the time (docs/tuning.md has figures).
-FORWARD = ("adfc",)
+#: Cost of a gradient in runs, measured with LQG's six numbers and ADFC's two (docs/tuning.md): one
+#: pass back through all samples costs the same however many numbers there are; a pass forward
+#: carries the derivative of each number along, besides what all of them share.
+REVERSE, FORWARD, EACH = 12.0, 4.2, 0.58
+MODES = ("forward", "reverse")
+
+
+def cheaper_mode(numbers: int) -> str:
+    """The mode of differentiation that costs less for so many numbers."""
+    return "forward" if FORWARD + EACH * numbers <= REVERSE else "reverse"
 
 
 def segment_length(samples: int, window: int) -> int:
@@ -36,36 +44,48 @@ def segment_length(samples: int, window: int) -> int:
 
 
 class Gradient:
-    """Mean objective over plants and motions, as a function of the log-numbers.
+    """Mean objective over plants and motions, as a function of a controller's coordinates.
 
     Args:
-        benchmark, controller: what is tuned; the name of the controller.
+        benchmark, controller: what is tuned; ``Tuned``, or a text that names the controller.
         objective: what counts.
         plants: T plants; they are split over the devices if their number allows it.
         motions: at the benchmark's rate; each length is compiled once.
         noise: sensor noise.
+        free: the numbers that the slope is of; all by default.
+        mode: one of ``MODES``; the cheaper one by default.
+
+    Attributes:
+        mode: that is used.
     """
 
     def __init__(
         self,
         benchmark: Benchmark,
-        controller: str,
+        controller: Tuned | str,
         objective: Objective,
         plants: Plants,
         motions: list[Motion],
         noise: SensorNoise | None = None,
+        free: Sequence[str] = (),
+        mode: str | None = None,
     ):
         check_runtime()
+        controller = tuned(controller) if isinstance(controller, str) else controller
+        self.free = tuple(free) or tuple(controller.start)
+        self.mode = mode or cheaper_mode(len(self.free))
+        if self.mode not in MODES:
+            raise argument_error("mode", f"be one of {', '.join(MODES)}", repr(mode))
         self.objective, self.plants = objective, plants
         fs = benchmark.fs
         trials = len(plants)
         devices = jax.local_devices()[: math.gcd(trials, jax.local_device_count())]
         observers = objective.observers(fs)
 
-        forward = controller in FORWARD
+        forward = self.mode == "forward"
 
-        def value(logs, weights, plants, ground, reference, noise):
-            ready = build(controller, benchmark, logs)
+        def value(moving, still, weights, plants, ground, reference, noise):
+            ready = controller.build(benchmark, {**still, **moving})
             states, _ = loop.run(
                 benchmark,
                 ready,
@@ -91,6 +111,7 @@ class Gradient:
             local,
             mesh=Mesh(np.array(devices), ("trials",)),
             in_specs=(
+                P(),
                 P(),
                 P(),
                 jax.tree.map(lambda x: P("trials") if jnp.ndim(x) else P(), plants),
@@ -124,12 +145,15 @@ class Gradient:
         other.objective = objective
         return other
 
-    def __call__(self, logs) -> tuple[float, dict[str, float], dict[str, float], float]:
-        """At log-numbers: objective, gradient, smooth indices, share of trials that diverged."""
+    def __call__(self, point) -> tuple[float, dict[str, float], dict[str, float], float]:
+        """At coordinates: objective, slope in ``free``, smooth indices, share of lost trials."""
         check_runtime()
-        logs = {name: jnp.asarray(value, dtype=float) for name, value in logs.items()}
+        point = {name: jnp.asarray(value, dtype=float) for name, value in point.items()}
+        moving = {name: point.pop(name) for name in self.free}
         weights = self.objective.weights
-        outcomes = [self.program(logs, weights, self.plants, *each) for each in self.inputs]
+        outcomes = [
+            self.program(moving, point, weights, self.plants, *each) for each in self.inputs
+        ]
         mean = lambda *x: float(np.mean([np.mean(np.asarray(v)) for v in x]))  # noqa: E731
         (loss, (smooth, lost)), slope = jax.tree.map(mean, *outcomes)
         return loss, slope, smooth, lost

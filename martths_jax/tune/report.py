@@ -8,54 +8,67 @@ from pathlib import Path
 
 import numpy as np
 
+from martths_jax import published
 from martths_jax.benchmark import Benchmark
 from martths_jax.campaign.files import write_text
 from martths_jax.files import atomic
 from martths_jax.indices import indices
 from martths_jax.motions import Motion
 from martths_jax.plant import draw_plants
-from martths_jax.published import ADFC, LQG, TABLE4
+from martths_jax.published import TABLE4
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import simulate
-from martths_jax.tune.parameters import host_controller
+from martths_jax.tune.parameters import Tuned, tuned
 
 FRESH = 1_000_001  # first trial number of the fresh plants; tuning starts at 1
 
 
 def write_report(
-    benchmark: Benchmark, controller: str, state: dict, check: Motion, plants: int, folder: Path
+    benchmark: Benchmark,
+    controller: Tuned | str,
+    state: dict,
+    check: Motion,
+    plants: int,
+    folder: Path,
+    noise: SensorNoise | None = None,
 ) -> list[dict]:
     """Write design.json, history.csv, convergence.png and comparison.csv into `folder`.
 
     Args:
+        controller: ``Tuned``, or a text that names it.
         state: from ``tune``.
         check: a motion that was not tuned on.
         plants: number of fresh plants.
+        noise: of the sensors; the benchmark's by default.
 
     Returns:
         rows of the comparison: index, medians with the start and the tuned numbers by the true
         indices, and what the paper prints (other motions, nominal plant).  The last two rows are
         the share of trials that diverged and the largest valve command [V].
     """
-    design = {name: 10.0**value for name, value in state["best"].items()}
-    report = {"controller": controller, "ended": state["ended"] or "all steps done", **design}
+    controller = tuned(controller) if isinstance(controller, str) else controller
+    design = controller.values(state["best"])
+    report = {"controller": controller.name, "ended": state["ended"] or "all steps done", **design}
     write_text(folder / "design.json", json.dumps(report, indent=1) + "\n")
     _write_csv(folder / "history.csv", state["history"])
-    _plot(state["history"], folder / "convergence.png")
-    rows = compare(benchmark, controller, state, check, plants)
+    _plot(state["history"], list(map(controller.column, state["start"])), folder)
+    rows = compare(benchmark, controller, state, check, plants, noise)
     _write_csv(folder / "comparison.csv", rows)
     return rows
 
 
-def compare(benchmark, controller, state, check: Motion, plants: int) -> list[dict]:
+def compare(
+    benchmark, controller: Tuned, state, check: Motion, plants: int, noise=None
+) -> list[dict]:
     """Start against tuned on fresh plants and an unseen motion; see ``write_report``."""
     seed = state["setting"]["seed"]
     fresh = draw_plants(plants, seed, first=FRESH)
-    column = {"lqg": LQG, "adfc": ADFC}[controller]
+    noise = noise or SensorNoise(seed=seed)
+    column = published.COLUMNS.get(controller.entry.name)
     medians = {}
     for name in ("start", "best"):
-        ready = host_controller(controller, benchmark, state[name])
-        result = simulate(benchmark, ready, fresh, check, SensorNoise(seed=seed))
+        ready = controller.on_host(benchmark, state[name])
+        result = simulate(benchmark, ready, fresh, check, noise)
         found = indices(result)
         kept = ~result.lost
         medians[name] = {
@@ -68,7 +81,7 @@ def compare(benchmark, controller, state, check: Motion, plants: int) -> list[di
             "index": n,
             "start": medians["start"][n],
             "tuned": medians["best"][n],
-            "published": TABLE4[n][column] if n in TABLE4 else "",
+            "published": "" if column is None or n not in TABLE4 else TABLE4[n][column],
         }
         for n in medians["start"]
     ]
@@ -81,7 +94,7 @@ def _write_csv(path: Path, rows: list[dict]) -> None:
         writer.writerows(rows)
 
 
-def _plot(history: list[dict], path: Path) -> None:
+def _plot(history: list[dict], columns: list[str], folder: Path) -> None:
     """Objective over steps, refused ones marked, and the numbers below."""
     import matplotlib.pyplot as plt  # slow to import, and only needed here
 
@@ -94,12 +107,13 @@ def _plot(history: list[dict], path: Path) -> None:
         if not row["accepted"]:
             top.axvline(row["step"], color="0.8", zorder=0)
     top.set_ylabel("objective")
-    for name in (n for n in history[0] if n.startswith("log10_")):
+    for name in columns:
         steps, values = [r["step"] for r in good], [r[name] - good[0][name] for r in good]
-        bottom.plot(steps, values, label=name[6:])
+        bottom.plot(steps, values, label=name.removeprefix("log10_"))
     bottom.set_xlabel("step")
-    bottom.set_ylabel("change of log10")
+    logs = all(name.startswith("log10_") for name in columns)
+    bottom.set_ylabel("change of log10" if logs else "change (of log10, if positive)")
     bottom.legend(ncols=3, fontsize="small")
-    with atomic(path) as part:
+    with atomic(folder / "convergence.png") as part:
         figure.savefig(part, dpi=150)
     plt.close(figure)

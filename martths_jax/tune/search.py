@@ -1,36 +1,41 @@
-"""The descent: Adam on log-numbers, with back-off, early stop and resumption."""
+"""A tuning: the descent of an objective, stored after each evaluation, resumed to the bit."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import jax
-import jax.numpy as jnp
 import numpy as np
-import optax
 
+import martths_jax
 from martths_jax.benchmark import VOLT_LIMIT, Benchmark
 from martths_jax.campaign.files import set_aside, write_text
 from martths_jax.campaign.header import sealed
 from martths_jax.campaign.machine import machine_identity
-from martths_jax.campaign.owner import Owner, owned
+from martths_jax.campaign.owner import owned
 from martths_jax.campaign.plan import motion_identity
 from martths_jax.campaign.provenance import differences, versions
-from martths_jax.campaign.sources import engine_code
+from martths_jax.campaign.session import Session
+from martths_jax.campaign.sources import code_of, engine_code
+from martths_jax.campaign.store import clear
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.motions import Motion
-from martths_jax.plant import draw_plants
+from martths_jax.plant import Plants, draw_plants
 from martths_jax.runtime import check_runtime
 from martths_jax.sensors import SensorNoise
-from martths_jax.tune.gradient import Gradient
+from martths_jax.tune.descent import METHODS, Method
+from martths_jax.tune.gradient import MODES, Gradient
 from martths_jax.tune.objective import Objective
-from martths_jax.tune.parameters import start_of
+from martths_jax.tune.parameters import Tuned, tuned
 
 STATE = "state.json"
-SHORTEST = 1e-3  # of the first step length: below, backing off has failed and tuning ends
+#: What a tuning leaves in its folder.
+OWN = (STATE, "provenance.json", "config.toml", "design.json", "history.csv", "convergence.png",
+       "comparison.csv")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -38,20 +43,24 @@ class Options:
     """What to tune and how.
 
     Attributes:
-        controller: ``lqg`` or ``adfc``.
+        controller: see ``parameters.tuned``.
         objective: see ``Objective.parse``.
-        plants: number of uncertain plants; seed: of plants and noise.
-        start: numbers to start from instead of the defaults (not logs).
+        trials: number of uncertain plants; seed: of plants and noise.
+        start: numbers to start from instead of the defaults.
         free: the numbers that may move; all by default.
-        steps: number of accepted or refused steps in all.
-        rate: length of a step, in decades of each number.
+        steps: number of evaluations in all.
+        rate: length of the first step, in decades of each number (in units of its start for one
+            that may be negative); with Adam, of every step.
         patience: stop after so many steps that improve the best by less than 0.1 %.
         volts, penalty: see ``Objective``.
+        method: ``lbfgs`` or ``adam``, see ``descent``.
+        mode: of differentiation, ``forward`` or ``reverse``; the cheaper one by default.
+        settings: of the controller besides those in its text, (name, value) pairs.
     """
 
     controller: str
     objective: str
-    plants: int = 32
+    trials: int = 32
     seed: int = 1
     start: tuple[tuple[str, float], ...] = ()
     free: tuple[str, ...] = ()
@@ -60,9 +69,12 @@ class Options:
     patience: int = 15
     volts: float = VOLT_LIMIT
     penalty: float = 10.0
+    method: str = "lbfgs"
+    mode: str | None = None
+    settings: tuple[tuple[str, object], ...] = ()
 
-    def check(self) -> tuple[Objective, dict[str, float]]:
-        """The objective and the start as log10.
+    def check(self) -> tuple[Objective, Tuned]:
+        """The objective and the controller with its start.
 
         Raises:
             InputError: naming every option that cannot be used.
@@ -70,23 +82,30 @@ class Options:
         problems, results = [], []
         for make in (
             lambda: Objective.parse(self.objective, self.volts, self.penalty),
-            lambda: start_of(self.controller, dict(self.start)),
+            lambda: tuned(self.controller, dict(self.start), dict(self.settings)),
         ):
             try:
                 results.append(make())
             except InputError as error:
                 problems.append(str(error))
-        for name in ("plants", "steps", "patience"):
+        for name in ("trials", "steps", "patience"):
             if getattr(self, name) < 1:
                 value = getattr(self, name)
                 problems.append(str(argument_error(name, "be at least 1", value)))
         if not 0 < self.rate <= 2:
             problems.append(str(argument_error("rate", "lie in (0, 2] decades", self.rate)))
+        for name, known in (("method", METHODS), ("mode", (None, *MODES))):
+            if getattr(self, name) not in known:
+                listed = ", ".join(str(k) for k in known if k)
+                value = repr(getattr(self, name))
+                problems.append(str(argument_error(name, f"be one of {listed}", value)))
         raise_all(problems, "The tuning cannot start")
-        unknown = sorted(set(self.free) - set(results[1]))
+        objective, controller = results
+        unknown = sorted(set(self.free) - set(controller.start))
         if unknown:
-            raise argument_error("free", f"name some of {', '.join(results[1])}", unknown[0])
-        return results[0], results[1]
+            listed = ", ".join(controller.start)
+            raise argument_error("free", f"name some of {listed}", repr(unknown[0]))
+        return objective, controller
 
 
 def tune(
@@ -95,125 +114,157 @@ def tune(
     motions: list[Motion],
     folder: Path,
     *,
+    plants: Plants | None = None,
+    noise: SensorNoise | None = None,
+    fresh: bool = False,
     tell: Callable[[dict], None] = lambda row: None,
     notice: Callable[[str], None] = lambda text: None,
     gradient: Gradient | None = None,
+    command_line: str = "tune(...)",
 ) -> dict:
     """Minimise the objective; keeps ``state.json`` in `folder` after each step and goes on from it.
 
     Args:
         motions: what to tune on.
         folder: where the state is kept; a folder with the state of other options is refused.
+        plants: to tune on, in place of ``options.trials`` independent ones.
+        noise: of the sensors; the benchmark's by default.
+        fresh: start over, deleting the tuning in the folder.
         tell: called with each row of the history.
         notice: is told what was damaged and set aside.
         gradient: of the same plants and motions with other weights of the same indices, which
             saves compiling one.
+        command_line: kept with the results.
 
     Returns:
-        the state: ``start``, ``best`` (log10 of the numbers), ``history`` (rows), ``ended``.
+        the state: ``start``, ``best`` (coordinates of the numbers, log10 of those that must not be
+        negative), ``history`` (rows), ``ended``.
 
     Raises:
         InputError: for options that cannot be used, a start with which a trial diverges, or a
             folder that holds another tuning or in which one runs.
     """
     check_runtime()
-    options.check()
+    objective, controller = options.check()
+    if gradient is None and benchmark is not None:
+        controller.check(benchmark)
     with owned(folder, f"tune {options.controller}") as owner:
-        return _descend(benchmark, options, motions, owner, tell, notice, gradient)
+        if fresh:
+            clear(folder, OWN)
+        state = _load_or_begin(
+            folder / STATE, options, setting_of(options, motions, benchmark, plants, noise), notice
+        )
+        devices = [str(d) for d in jax.local_devices()]
+        session = Session(folder, owner, command_line, devices=devices)
+        try:
+            if gradient is None:
+                plants = draw_plants(options.trials, options.seed) if plants is None else plants
+                noise = noise or SensorNoise(seed=options.seed)
+                free, mode = options.free, options.mode
+                gradient = Gradient(
+                    benchmark, controller, objective, plants, motions, noise, free, mode
+                )
+            else:
+                gradient = gradient.of(objective)
+            method = METHODS[options.method](options.free or tuple(controller.start), options.rate)
+            while not state["ended"] and len(state["history"]) < options.steps:
+                _step(state, gradient, controller, method, options)
+                tell(state["history"][-1])
+                session.count(options.trials * len(motions))
+                owner.check()
+                write_text(folder / STATE, json.dumps(sealed(state), indent=1))
+        finally:
+            session.save()
+        return state
 
 
-def setting_of(options: Options, motions: list[Motion]) -> dict:
+def setting_of(
+    options: Options,
+    motions: list[Motion],
+    benchmark: Benchmark | None = None,
+    plants: Plants | None = None,
+    noise: SensorNoise | None = None,
+) -> dict:
     """What decides the course of a tuning, as JSON can hold it."""
     setting = {k: v for k, v in asdict(options).items() if k != "steps"} | {
         "motions": [[m.name, motion_identity(m)] for m in motions],
         "versions": versions(),
         "code": engine_code(("tune/*.py",)),
         "machine": machine_identity(),
+        "benchmark": _digest(benchmark),
+        "plants": None if plants is None else _digest(plants),
+        "noise": None if noise is None else asdict(noise),
+        "controller_code": _code(options),
     }
-    return json.loads(json.dumps(setting))
+    return json.loads(json.dumps(setting, default=str))
 
 
-def _descend(benchmark, options, motions, owner: Owner, tell, notice, gradient) -> dict:
-    """The steps that are not done yet; see ``tune``."""
-    objective, start = options.check()
-    folder, setting = owner.folder, setting_of(options, motions)
-    free = options.free or tuple(start)
-    optimiser = optax.adam(1.0)
-    state = _load(folder / STATE, setting, notice)
-    if state is None:
-        blank = optimiser.init({name: jnp.zeros(()) for name in free})
-        state = {
-            "setting": setting, "start": start, "best": start, "here": start, "trial": start,
-            "moments": _leaves(blank), "length": options.rate, "history": [], "ended": "",
-        }  # fmt: skip
-    plants = draw_plants(options.plants, options.seed)
-    if gradient is None:
-        noise = SensorNoise(seed=options.seed)
-        gradient = Gradient(benchmark, options.controller, objective, plants, motions, noise)
-    else:
-        gradient = gradient.of(objective)
-    template = jax.tree.structure(optimiser.init({name: jnp.zeros(()) for name in free}))
-    while not state["ended"] and len(state["history"]) < options.steps:
-        loss, slope, smooth, lost = gradient(state["trial"])
-        finite = np.all(np.isfinite([loss, *slope.values()]))
-        good = bool(finite and lost == 0)
-        if not state["history"] and not good:
-            raise InputError(
-                "Argument `start` must be stable on every plant, but "
-                f"{100 * lost:.3g} % of the trials diverged; start from other values."
-            )
-        state["history"].append(
-            {
-                "step": len(state["history"]), "accepted": good, "objective": loss,
-                "diverged": lost, "length": state["length"], **smooth,
-                **{f"log10_{name}": value for name, value in state["trial"].items()},
-            }
-        )  # fmt: skip
-        if good:
-            _accept(state, slope, free, optimiser, template)
-        else:
-            _back_off(state, options)
-        if _stalled(state["history"], options.patience):
-            state["ended"] = state["ended"] or "no more improvement"
-        tell(state["history"][-1])
-        owner.check()
-        write_text(folder / STATE, json.dumps(sealed(state), indent=1))
-    return state
+def _digest(tree) -> str:
+    """Checksum of all arrays and constants of a pytree."""
+    leaves, shape = jax.tree.flatten(tree)
+    found = hashlib.sha256(str(shape).encode())
+    for leaf in leaves:
+        found.update(np.ascontiguousarray(leaf).tobytes())
+    return found.hexdigest()
 
 
-def _accept(state, slope, free, optimiser, template):
-    """Move the state to the point just evaluated, and propose the next one."""
-    moments = jax.tree.unflatten(template, [jnp.asarray(x) for x in state["moments"]])
-    slope = {name: jnp.asarray(slope[name]) for name in free}
-    move, moments = optimiser.update(slope, moments)
-    state["moments"] = _leaves(moments)
-    state["here"] = state["trial"]
-    state["trial"] = dict(state["here"])
-    for name in free:
-        state["trial"][name] += state["length"] * float(move[name])
-    good = [row for row in state["history"] if row["accepted"]]
-    best = min(good, key=lambda row: row["objective"])
-    state["best"] = {name: best[f"log10_{name}"] for name in state["start"]}
+def _code(options: Options) -> dict | None:
+    """What identifies the code of a controller that is not of this package."""
+    _, controller = options.check()
+    kind = controller.entry.controller
+    if kind.__module__.partition(".")[0] == martths_jax.__name__:
+        return None
+    return code_of(kind) | {"file": controller.guest.sha256}
 
 
-def _back_off(state, options):
-    """Half the way back to the last good point, and shorter steps from now on."""
-    state["length"] /= 2
-    state["trial"] = {
-        name: (value + state["here"][name]) / 2 for name, value in state["trial"].items()
-    }
-    if state["length"] < SHORTEST * options.rate:
-        state["ended"] = "steps became too short: every direction is unstable"
+def _load_or_begin(path: Path, options: Options, setting: dict, notice) -> dict:
+    """The state in a folder, or that of a tuning that begins."""
+    state = _load(path, setting, notice)
+    if state is not None:
+        return state
+    _, controller = options.check()
+    start = controller.coordinates(controller.start)
+    method = METHODS[options.method](options.free or tuple(start), options.rate)
+    return {"setting": setting, "start": start, "best": start, "descent": method.init(start),
+            "history": [], "ended": ""}  # fmt: skip
 
 
-def _stalled(history, patience) -> bool:
+def _step(state: dict, gradient: Gradient, controller: Tuned, method: Method, options: Options):
+    """One evaluation, and where the next will be."""
+    descent, history = state["descent"], state["history"]
+    here = dict(descent["trial"])
+    length = max(abs(x - descent["here"][name]) for name, x in here.items())
+    loss, slope, smooth, lost = gradient(here)
+    good = bool(np.all(np.isfinite([loss, *slope.values()])) and lost == 0)
+    if not history and not good:
+        raise InputError(
+            "Argument `start` must be stable on every plant, but "
+            f"{100 * lost:.3g} % of the trials diverged; start from other values."
+        )
+    if good and loss < min((row["objective"] for row in _good(history)), default=np.inf):
+        state["best"] = here
+    accepted = method.advance(descent, loss, slope, good)
+    history.append(
+        {
+            "step": len(history), "accepted": accepted, "objective": loss, "diverged": lost,
+            "length": length, **smooth, **controller.shown(here),
+        }
+    )  # fmt: skip
+    state["ended"] = descent["ended"]
+    if _stalled(history, options.patience):
+        state["ended"] = state["ended"] or "no more improvement"
+
+
+def _good(history: list[dict]) -> list[dict]:
+    """Rows at which no trial diverged."""
+    return [r for r in history if r["diverged"] == 0 and np.isfinite(r["objective"])]
+
+
+def _stalled(history: list[dict], patience: int) -> bool:
     """Whether the last `patience` steps did not improve the best by 0.1 %."""
-    best = np.minimum.accumulate([r["objective"] if r["accepted"] else np.inf for r in history])
+    values = [r["objective"] if _good([r]) else np.inf for r in history]
+    best = np.minimum.accumulate(values)
     return len(best) > patience and best[-1] > (1 - 1e-3) * best[-1 - patience]
-
-
-def _leaves(tree) -> list:
-    return [np.asarray(x).tolist() for x in jax.tree.leaves(tree)]
 
 
 def _load(path: Path, setting: dict, notice) -> dict | None:

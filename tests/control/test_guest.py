@@ -130,8 +130,8 @@ def test_shares_become_one(study, place):
 
 
 def test_a_sweep_over_its_own_parameter(study, place):
-    martths("sweep", "--axis", "lead=0.01,0.02", "--axis", "corner=300", "--no-figures",
-            *settings(place, "sweep", "--trials", 6, "--controller", f"{place}/mine.py"))  # fmt: skip
+    words = settings(place, "sweep", "--trials", 6, "--controller", f"{place}/mine.py")
+    martths("sweep", "--axis", "lead=0.01,0.02", "--axis", "corner=300", "--no-figures", *words)
     swept = open_sweep(place / "sweep").dataset
     assert swept.lead.attrs["units"] == "s" and swept.lead.attrs["long_name"] == "lead tau"
     found = swept.value.sel(controller="lead", corner=300)

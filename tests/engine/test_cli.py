@@ -46,7 +46,7 @@ def test_run_saves_signals_indices_and_settings(motion_file, tmp_path):
     out = tmp_path / "out"
     result = invoke(
         "run", "--motion", motion_file, "--controller", "lqg", "--trial", 3, "--seed", 5,
-        "--scale", 1.0, "--out", out, "--mat",
+        "--scale", 1.0, "--out", out, "--matlab",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     assert sorted(p.name for p in out.iterdir()) == [

@@ -22,8 +22,8 @@ from martths_jax import (
     simulate,
 )
 from martths_jax.checks import OTHER_PLANT, plant_notice
-from martths_jax.plant import NOMINAL_HZ, frequency_response
 from martths_jax.structure.modal import to_dense
+from martths_jax.transfer import NOMINAL_HZ, frequency_response
 from tests.engine.motions import burst
 
 #: Real poles half as fast as the benchmark's.

@@ -10,8 +10,9 @@ from martths_jax import InputError, build_coupler, draw_plants, nominal_plant, p
 from martths_jax.benchmark import continuous_plant
 from martths_jax.control.estimators.kalman import design_kalman, steady_state_gains
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
-from martths_jax.plant import HZ, SIGMA, frequency_response
+from martths_jax.plant import SIGMA
 from martths_jax.structure.modal import to_dense
+from martths_jax.transfer import HZ, frequency_response
 
 DT = 1 / 1024
 

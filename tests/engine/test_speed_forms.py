@@ -16,7 +16,8 @@ from martths_jax import (
     simulate,
 )
 from martths_jax.algebra import least_squares as ls
-from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES, TAPS, regress
+from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES, TAPS, BackwardDifferences
+from martths_jax.control.adaptive.window import Window
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
 from martths_jax.indices import NAMES, correlate, delay
 from tests.engine.motions import burst
@@ -124,7 +125,7 @@ def test_refreshed_sliding_sums_do_not_drift(dying_rows):
     """The end lies inside a window, so that rows of the last and of this one are in the sum."""
     nb = 1024
     assert len(dying_rows) % nb
-    refreshed = slide(dying_rows, nb, ADFC(nb=nb).turn)
+    refreshed = slide(dying_rows, nb, Window(nb).renew)
     assert relative_error(refreshed, dying_rows, nb) < 1e-12
 
 
@@ -137,12 +138,13 @@ def test_sliding_sums_that_are_never_refreshed_do_drift(dying_rows):
 def test_difference_recurrences_give_the_backward_differences():
     rng = np.random.default_rng(3)
     samples = np.concatenate([np.zeros((TAPS - 1, 2, 3)), rng.standard_normal((30, 2, 3))])
-    kept = ((jnp.zeros(3),) * (TAPS - 1),) * 2
+    regressor = BackwardDifferences()
+    kept = regressor.init(3)
     for k in range(TAPS - 1, len(samples)):
-        kept, phi = regress(kept, jnp.asarray(samples[k]))
+        kept, phi = regressor.step(kept, jnp.asarray(samples[k]))
         taps = samples[k - TAPS + 1 : k + 1][::-1]
-        expected = np.einsum("dn,nat->adt", BACKWARD_DIFFERENCES, taps).reshape(8, 3)
-        np.testing.assert_allclose(np.stack(phi), expected, rtol=0, atol=1e-13)
+        expected = np.einsum("dn,nat->adt", BACKWARD_DIFFERENCES, taps)
+        np.testing.assert_allclose(np.array(phi), expected, rtol=0, atol=1e-13)
 
 
 def test_pieces_divide_a_window():

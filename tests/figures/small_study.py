@@ -18,11 +18,12 @@ from martths_jax import ADFC, Motion
 from martths_jax.campaign.dataset import read_dataset, write_dataset
 from martths_jax.campaign.engine import Outcome
 from martths_jax.campaign.plan import build_plan
+from martths_jax.campaign.session import header
 from martths_jax.campaign.store import FORMAT, RunFolder
 from martths_jax.indices import DELAYS, NAMES
 from martths_jax.signals import SIGNALS
 from martths_jax.study import make_config
-from martths_jax.study.runner import header, write_results
+from martths_jax.study.runner import write_results
 from martths_jax.study.signals import choose_trials, group, stored_signal
 from martths_jax.watch import Status
 from tests.engine.motions import burst

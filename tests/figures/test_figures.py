@@ -18,9 +18,9 @@ from martths_jax.figures.plants import FREQUENCY, spectral_delay
 from martths_jax.figures.structure import deformed
 from martths_jax.figures.style import DOUBLE, SINGLE
 from martths_jax.files import safe_name
-from martths_jax.plant import NOMINAL_HZ, frequency_response
 from martths_jax.structure.frame import build_reference, modes
 from martths_jax.structure.sections import FrameGeometry
+from martths_jax.transfer import NOMINAL_HZ, frequency_response
 from tests.figures.small_study import MOTIONS, TRIALS
 
 NAMES = {

@@ -25,7 +25,7 @@ from martths_jax.control.adaptive.inverse import nominal_inverse
 from martths_jax.control.controllers import adfc
 from martths_jax.control.controllers.adfc import CONDITION_LIMIT
 from martths_jax.indices import trials_last
-from martths_jax.plant import frequency_response
+from martths_jax.transfer import frequency_response
 from tests.engine.motions import burst
 
 NB = 128

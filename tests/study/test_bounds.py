@@ -115,8 +115,9 @@ def test_values_in_messages_are_cut():
 
 def test_the_title_counts_trials_with_all_indices(tmp_path):
     config = make_config(small(tmp_path, motions=(short_motion(),), trials=3))
+    from martths_jax.campaign.session import header
     from martths_jax.campaign.store import RunFolder
-    from martths_jax.study.runner import header, write_results
+    from martths_jax.study.runner import write_results
     from tests.study.small_outcome import outcome
 
     run = RunFolder.start(tmp_path, header(build_plan(config), ""))

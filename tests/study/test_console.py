@@ -11,12 +11,13 @@ from rich.console import Console
 from martths_jax.campaign.config import make_config
 from martths_jax.campaign.plan import build_plan
 from martths_jax.campaign.progress import Bars, Tally
+from martths_jax.campaign.session import header
 from martths_jax.campaign.store import RunFolder
 from martths_jax.cli import main, motions, nominal, tune
 from martths_jax.cli.console import accept_any_text, console
 from martths_jax.motions import MotionInfo
 from martths_jax.screen import ScreenTable
-from martths_jax.study.runner import header, write_results
+from martths_jax.study.runner import write_results
 from martths_jax.study.summary import Table, summarise
 from tests.study.places import short_motion, small
 from tests.study.small_outcome import outcome

@@ -21,7 +21,8 @@ from martths_jax.campaign.draws import write_plants
 from martths_jax.campaign.export import write_csv, write_mat
 from martths_jax.campaign.files import write_text, writing
 from martths_jax.campaign.plan import build_plan
-from martths_jax.study.runner import header, write_results
+from martths_jax.campaign.session import header
+from martths_jax.study.runner import write_results
 from martths_jax.campaign.store import RunFolder
 from tests.study.small_outcome import outcome
 

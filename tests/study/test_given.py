@@ -12,7 +12,7 @@ from martths_jax.campaign.config import read_toml
 from martths_jax.campaign.given import split_list
 from martths_jax.campaign.plan import build_plan
 from martths_jax.cli import app
-from martths_jax.cli.run_options import words
+from martths_jax.cli.options import words
 from martths_jax.figures import draw_figures
 from martths_jax.figures.style import look
 from martths_jax.report import render

@@ -12,9 +12,10 @@ from martths_jax import InputError
 from martths_jax.campaign.config import make_config
 from martths_jax.campaign.export import write_csv
 from martths_jax.campaign.plan import build_plan
+from martths_jax.campaign.session import header
 from martths_jax.campaign.store import RunFolder
 from martths_jax.files import LONGEST_NAME, name_problems, safe_name
-from martths_jax.study.runner import header, write_results
+from martths_jax.study.runner import write_results
 from martths_jax.study.signals import group
 from martths_jax.study.summary import Table
 from martths_jax.text import counted, csv_cell, csv_field, markdown_text

@@ -13,8 +13,8 @@ import pytest
 
 from martths_jax import InputError
 from martths_jax.campaign.distributed import join
+from martths_jax.campaign.run import share_of
 from martths_jax.study import Reporter, merge_runs, open_study, run_study
-from martths_jax.study.runner import share_of
 from tests.study.places import ONE_BLOCK, result_bytes, short_motion, small
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -229,7 +229,7 @@ def test_machines_that_compile_otherwise_do_not_mix_unasked(whole, copy, tmp_pat
     real = machine.machine_identity()
     other = real | {"instructions": real["instructions"] + " avx1024"}
     monkeypatch.setattr(machine, "machine_identity", lambda: other)
-    monkeypatch.setattr("martths_jax.study.runner.machine_identity", lambda: other)
+    monkeypatch.setattr("martths_jax.campaign.session.machine_identity", lambda: other)
     with pytest.raises(InputError, match=r"machine\.instructions.*avx1024.*--allow-mixed"):
         run_study(small(copy, trials=30))
     assert result_bytes(copy) == result_bytes(whole.folder)

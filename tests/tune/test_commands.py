@@ -37,11 +37,13 @@ def short_motion(tmp_path):
         (("--start", "e1"), "must be NAME=VALUE, but got 'e1'"),
         (("--start", "pull=1e-5"), "`start` must name one of e1, e2, r2, y1, y2, q"),
         (("--controller", "adfc", "--start", "pull=0"), "give a positive pull"),
-        (("--plants", 0), "`plants` must be at least 1, but got 0"),
+        (("--trials", 0), "`trials` must be a whole number from 1"),
         (("--steps", 0), "`steps` must be at least 1, but got 0"),
-        (("--fresh-plants", 0), "--fresh-plants must be at least 1, but got 0"),
-        (("--controller", "pid"), "`controller` must be one of ['adfc', 'lqg'], but got 'pid'"),
-        (("--check", "elcentro-like"), "a motion that is not tuned on"),
+        (("--check-trials", 0), "--check-trials must be at least 1, but got 0"),
+        (("--controller", "pid"), "'pid' is unknown"),
+        (("--check-motion", "elcentro-like"), "a motion that is not tuned on"),
+        (("--controller", "lqg,adfc"), "--controller takes one value here, but got lqg, adfc"),
+        (("--method", "newton"), "`method` must be one of lbfgs, adam"),
     ],
 )
 def test_a_mistake_is_one_sentence(words, sentence, capsys, monkeypatch, tmp_path):
@@ -53,9 +55,9 @@ def test_a_mistake_is_one_sentence(words, sentence, capsys, monkeypatch, tmp_pat
 
 
 def test_several_mistakes_are_told_at_once(capsys, monkeypatch, tmp_path):
-    words = ("--out", tmp_path, "--plants", 0, "--objective", "j99", "--start", "q=-1")
+    words = ("--out", tmp_path, "--steps", 0, "--objective", "j99", "--start", "q=-1")
     _, text = said(capsys, monkeypatch, *words)
-    for part in ("`plants`", "'j99'", "positive q"):
+    for part in ("`steps`", "'j99'", "positive q"):
         assert part in text
 
 

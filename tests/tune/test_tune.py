@@ -19,15 +19,18 @@ from martths_jax import (
     loop,
 )
 from martths_jax.campaign.owner import owned
+from martths_jax.control.controllers.adfc import GUARD_PULL
+from martths_jax.control.entry import Entry, Parameter
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import reference_response
 from martths_jax.tune import Options, tune
-from martths_jax.tune import gradient as gradients
 from martths_jax.tune import search as searching
 from martths_jax.tune.gradient import Gradient
 from martths_jax.tune.objective import Objective
-from martths_jax.tune.parameters import start_of
+from martths_jax.tune.parameters import start_of, tuned
+from tests.tune import guest as guests
 from tests.tune.bowl import Bowl
+from tests.tune.guest import Lead
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +86,10 @@ def test_gradient_through_checkpointed_segments(benchmark, motion, kind):
 def bowl(monkeypatch):
     monkeypatch.setattr(searching, "Gradient", Bowl)
     monkeypatch.setattr(Bowl, "wall", np.inf)
-    return Options("adfc", "j2", plants=1, steps=60, rate=0.2, start=(("pull", 1e-5), ("q", 1e-3)))
+    return Options(
+        "adfc", "j2", trials=1, steps=60, rate=0.2, start=(("pull", 1e-5), ("q", 1e-3)),
+        method="adam",
+    )  # fmt: skip
 
 
 def test_descent_finds_the_minimum_and_stops_early(bowl, tmp_path):
@@ -93,13 +99,40 @@ def test_descent_finds_the_minimum_and_stops_early(bowl, tmp_path):
     assert state["ended"] and len(state["history"]) < 400
 
 
-def test_interrupted_tuning_goes_on_as_if_nothing_had_happened(bowl, tmp_path):
+@pytest.mark.parametrize("wall", [np.inf, -3.9])
+@pytest.mark.parametrize("method", ["lbfgs", "adam"])
+def test_interrupted_tuning_goes_on_as_if_nothing_had_happened(
+    bowl, tmp_path, monkeypatch, method, wall
+):
+    """Killed after any evaluation, also in the middle of a line search."""
+    monkeypatch.setattr(Bowl, "wall", wall)
+    bowl = replace(bowl, method=method, steps=25)
     whole = tune(None, bowl, [], tmp_path / "whole")
-    tune(None, replace(bowl, steps=7), [], tmp_path / "parts")
-    parts = tune(None, bowl, [], tmp_path / "parts")
-    assert parts["history"] == whole["history"]
+    for steps in range(1, len(whole["history"]) + 1):
+        parts = tune(None, replace(bowl, steps=steps), [], tmp_path / "parts")
+        assert repr(parts["history"]) == repr(whole["history"][:steps])  # NaN is not itself
+    assert (parts["best"], parts["ended"]) == (whole["best"], whole["ended"])
+    if np.isfinite(wall):
+        assert any(row["diverged"] for row in whole["history"])
     with pytest.raises(InputError, match="other options"):
         tune(None, replace(bowl, seed=2), [], tmp_path / "parts")
+
+
+def test_lbfgs_needs_few_evaluations(bowl, tmp_path):
+    state = tune(None, replace(bowl, method="lbfgs"), [], tmp_path)
+    assert state["best"] == pytest.approx({"pull": -3, "q": -4}, abs=1e-9)
+    assert len(state["history"]) < 12 and state["ended"]
+
+
+def test_a_fresh_start_and_what_is_left_of_a_session(bowl, tmp_path):
+    tune(None, replace(bowl, steps=4), [], tmp_path)
+    (tmp_path / "design.json").write_text("{}")
+    (tmp_path / "mine.txt").write_text("kept")
+    state = tune(None, replace(bowl, steps=2, seed=2), [], tmp_path, fresh=True)
+    assert len(state["history"]) == 2
+    assert not (tmp_path / "design.json").exists() and (tmp_path / "mine.txt").exists()
+    sessions = json.loads((tmp_path / "provenance.json").read_text())["sessions"]
+    assert [s["trials"] for s in sessions] == [0] and sessions[0]["compile_seconds"] >= 0
 
 
 @pytest.mark.parametrize("change", ["scale", "samples"])
@@ -157,9 +190,8 @@ def test_only_free_numbers_move(bowl, tmp_path):
     assert state["best"]["pull"] == -5 and state["best"]["q"] < -3.5
 
 
-def test_gradient_of_plants_and_motions_and_of_other_weights(benchmark, motion, monkeypatch):
+def test_gradient_of_plants_and_motions_and_of_other_weights(benchmark, motion):
     """Forward mode against finite differences; one program for all weights of the same indices."""
-    monkeypatch.setattr(gradients, "FORWARD", ("lqg",))
     short = replace(motion, acceleration=motion.acceleration[512:1100])
     gradient = Gradient(
         benchmark, "lqg", Objective.parse("j5+j8"), draw_plants(2, seed=3), [short, short]
@@ -176,3 +208,78 @@ def test_gradient_of_plants_and_motions_and_of_other_weights(benchmark, motion, 
         assert slope[name] == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-4)
     with pytest.raises(InputError, match="J2_1"):
         other.of(Objective.parse("j2"))
+
+
+def lead(benchmark, motion, **more):
+    """Gradient of the guest's only number."""
+    guest = f"{Lead.__module__}:Lead"
+    return Gradient(benchmark, guest, Objective.parse("j2+j5"), draw_plants(2, seed=3), [motion],
+                    **more)  # fmt: skip
+
+
+def test_both_modes_give_the_same_slope(benchmark, motion):
+    short = replace(motion, acceleration=motion.acceleration[512:1300])
+    start = start_of(f"{Lead.__module__}:Lead")
+    ways = {mode: lead(benchmark, short, mode=mode) for mode in ("forward", "reverse")}
+    assert lead(benchmark, short).mode == "forward"
+    found = {mode: gradient(start) for mode, gradient in ways.items()}
+    assert found["forward"][0] == pytest.approx(found["reverse"][0], rel=1e-12)
+    assert found["forward"][1]["lead"] == pytest.approx(found["reverse"][1]["lead"], rel=1e-8)
+    ends = [ways["forward"]({"lead": start["lead"] + h})[0] for h in (1e-4, -1e-4)]
+    assert found["forward"][1]["lead"] == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-5)
+    with pytest.raises(InputError, match="`mode` must be one of forward, reverse"):
+        lead(benchmark, short, mode="sideways")
+
+
+def test_the_slope_is_of_the_free_numbers_only(benchmark, motion):
+    short = replace(motion, acceleration=motion.acceleration[512:1100])
+    given = ("lqg", Objective.parse("j5+j8"), draw_plants(2, seed=3), [short])
+    some = Gradient(benchmark, *given, free=("q",))
+    assert set(some(start_of("lqg"))[1]) == {"q"}
+
+
+def test_a_number_of_any_sign_is_tuned_as_it_is(benchmark):
+    found = tuned(f"{Lead.__module__}:Lead{{lead=-0.01}}")
+    assert not found.is_log("lead") and found.start == {"lead": -0.01}
+    at = found.coordinates(found.start)
+    assert at == {"lead": -1.0} and found.values(at) == found.shown(at) == found.start
+    assert found.on_host(benchmark, {"lead": 2.0}).lead == 0.02
+    assert float(found.build(benchmark, {"lead": 2.0}).lead) == 0.02
+
+
+def test_what_an_entry_gives_is_where_tuning_starts():
+    assert start_of("adfc") == {"pull": float(np.log10(GUARD_PULL)), "q": float(np.log10(3e-5))}
+    assert tuned("slow=adfc{nb=64,no=63,q=1e-6}").start["q"] == 1e-6
+    assert tuned("slow=adfc{nb=64,no=63,q=1e-6}").fixed == {"nb": 64, "no": 63}
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("passthrough", "no number that can be tuned"),
+        ("adfc{nbs=64}", "settings among pull, q, nb"),
+        ("adfc{nb=2}", "`nb` must be a whole number of at least 9"),
+        ("adfc{q=-1}", "positive q"),
+        ("lqgg", "'lqgg' is unknown; the nearest are lqg"),
+    ],
+)
+def test_controllers_that_cannot_be_tuned(given, words):
+    with pytest.raises(InputError, match=words):
+        tuned(given)
+
+
+def test_a_setting_that_only_the_constructor_takes_is_refused_before_compiling(benchmark, tmp_path):
+    options = Options("lqg{error=measured}", "j2")
+    with pytest.raises(InputError, match="cannot be tuned with error set"):
+        tune(benchmark, options, [], tmp_path)
+
+
+def test_an_entry_without_a_start_asks_for_one(tmp_path):
+    entry = Entry("mine", Lead, parameters=(Parameter("lead", kind="tunable"),))
+    guests.MINE = entry
+    try:
+        with pytest.raises(InputError, match="`start` must give lead a value"):
+            tuned(f"{Lead.__module__}:MINE")
+        assert tuned(f"{Lead.__module__}:MINE", {"lead": 0.01}).start == {"lead": 0.01}
+    finally:
+        del guests.MINE

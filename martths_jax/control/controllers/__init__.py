@@ -3,6 +3,7 @@
 from martths_jax.control.base import Controller, Decision, Observation
 from martths_jax.control.controllers import adfc, lqg, passthrough
 from martths_jax.control.controllers.adfc import ADFC
+from martths_jax.control.controllers.feedforward import AdaptiveFeedforward
 from martths_jax.control.controllers.frozen import FrozenFeedforward
 from martths_jax.control.controllers.lqg import LQG
 from martths_jax.control.controllers.passthrough import Passthrough
@@ -14,6 +15,7 @@ __all__ = [
     "ADFC",
     "ENTRIES",
     "LQG",
+    "AdaptiveFeedforward",
     "Controller",
     "Decision",
     "FrozenFeedforward",

@@ -18,18 +18,25 @@ import jax.numpy as jnp
 import numpy as np
 
 from martths_jax.algebra import least_squares as ls
-from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES, TAPS, regress
+from martths_jax.control.adaptive.base import known
+from martths_jax.control.adaptive.differences import BackwardDifferences
+from martths_jax.control.adaptive.guards import ConditionGate, Pull
 from martths_jax.control.adaptive.inverse import nominal_inverse
-from martths_jax.control.base import Controller, Decision, DelayLine, Signal
-from martths_jax.control.controllers.frozen import FrozenFeedforward
+from martths_jax.control.adaptive.window import Window
+from martths_jax.control.base import Controller
+from martths_jax.control.controllers.feedforward import (
+    SIGNALS,
+    AdaptiveFeedforward,
+    follow_target,
+)
 from martths_jax.control.entry import Derived, Entry, Parameter
 from martths_jax.control.estimators import design_kalman
 from martths_jax.errors import argument_error, raise_all
-from martths_jax.resources import available_memory
 
+#: Value and three derivatives of both strokes.
+REGRESSOR = BackwardDifferences(order=3, accuracy=2)
 #: Coefficients that do nothing: u follows x_a.
-FOLLOW_TARGET = np.zeros((8, 2))
-FOLLOW_TARGET[0, 0] = FOLLOW_TARGET[4, 1] = 1.0
+FOLLOW_TARGET = follow_target(REGRESSOR.columns, joint=True)
 #: Pull towards the inverse plant that keeps every trial (docs/guarded_adfc.md has the evidence)
 #: [mm^2].
 GUARD_PULL = 6e-5
@@ -37,8 +44,6 @@ GUARD_PULL = 6e-5
 ANCHORS = ("start", "inverse")
 #: A fit whose normal matrix is worse conditioned is not used (the paper's bound).
 CONDITION_LIMIT = 1e14
-#: Memory of a row of the buffer for trials side by side, with the inputs of a window [bytes].
-NB_BYTES = 8 * 8 * 128
 
 
 @jax.tree_util.register_dataclass
@@ -78,13 +83,7 @@ class ADFC(Controller):
 
     name = "adfc"
     adapts = True
-    signals = (
-        Signal("C_A", ("coefficient", "actuator"), "1",
-               "adaptive coefficients in scaled derivatives", elements=tuple(
-                   f"u{actuator}: x{stroke}" + "'" * order
-                   for stroke in (1, 2) for order in range(4) for actuator in (1, 2))),
-        Signal("held", (), "1", "fits that the controller did not use", count=True),
-    )  # fmt: skip
+    signals = SIGNALS
     shared_axes = MappingProxyType({"no": 0, "pull": 0, "q": 0, "start": 2, "anchor": 2})
 
     def __post_init__(self):
@@ -92,33 +91,32 @@ class ADFC(Controller):
         if all(type(x) in (int, float) for x in numbers):  # not when JAX rebuilds it from leaves
             raise_all(self.problems(None), "The controller cannot be used")
 
+    def composed(self) -> AdaptiveFeedforward:
+        """The same controller as pieces."""
+        return AdaptiveFeedforward(
+            regressor=REGRESSOR,
+            fit=Window(self.nb, self.no, self.solver),
+            guards=(Pull(self.pull, self.anchor), ConditionGate(CONDITION_LIMIT)),
+            start=self.start,
+            q=self.q,
+            estimator=self.estimator,
+        )
+
     def problems(self, benchmark):
-        found = []
+        whole = self.composed()
+        found = whole.fit.problems(whole)
 
         def expect(good, name, wanted, got):
             if not good:
                 found.append(str(argument_error(name, wanted, got)))
 
-        def known(value):
-            # A traced value has none yet; it is the caller's to keep in range.
-            given = value is not None and not isinstance(value, jax.core.Tracer)
-            return np.asarray(value) if given else None
-
-        nb, no, pull, q = self.nb, known(self.no), known(self.pull), known(self.q)
-        whole = isinstance(nb, (int, np.integer))
-        expect(whole and nb >= 9, "nb", "be a whole number of at least 9 (8 unknowns)", nb)
-        if whole:
-            room = int(available_memory() / 2 / NB_BYTES)
-            expect(nb <= room, "nb", f"be at most {room}, whose rows fit into memory", nb)
-        if whole and no is not None:
-            expect(np.all((no >= 0) & (no <= nb - 1)), "no", f"lie in [0, nb - 1 = {nb - 1}]", no)
+        pull, q = known(self.pull), known(self.q)
         if pull is not None:
             good = np.all(np.isfinite(pull) & (pull >= 0))
             expect(good, "pull", "be zero or positive (mm^2)", pull)
         if q is not None:
             expect(np.all(np.isfinite(q) & (q > 0)), "q", "be positive (mm^2)", q)
         expect(self.towards in (None, *ANCHORS), "towards", f"be one of {ANCHORS}", self.towards)
-        expect(self.solver in ls.SOLVERS, "solver", f"be one of {sorted(ls.SOLVERS)}", self.solver)
         for name in ("start", "anchor"):
             value = known(getattr(self, name))
             if value is None or value.dtype == object:
@@ -135,7 +133,7 @@ class ADFC(Controller):
         if anchor is None and towards == "start":
             anchor = start
         elif anchor is None:
-            anchor = nominal_inverse(benchmark.plant_model, benchmark.fs, BACKWARD_DIFFERENCES)
+            anchor = nominal_inverse(benchmark.plant_model, benchmark.fs, REGRESSOR.matrix)
         return replace(
             self,
             no=jnp.asarray(self.no),
@@ -147,77 +145,16 @@ class ADFC(Controller):
 
     def frozen(self, benchmark, coefficients):
         """The same feedforward with (8, 2) or (8, 2, T) coefficients that stay."""
-        estimator = self.prepare(benchmark).estimator
-        return FrozenFeedforward(jnp.asarray(coefficients, dtype=float), estimator)
+        return self.prepare(benchmark).composed().frozen(benchmark, coefficients)
 
     def init(self, trials):
-        zero = jnp.zeros(trials)
-        taps = ((zero,) * (TAPS - 1),) * 2
-        start = tuple(tuple(jnp.broadcast_to(c, (trials,)) for c in row) for row in self.start)
-        return {
-            "coefficients": start,
-            # Normal equations of all rows in the buffer, and of those of this window alone.
-            "rows": ls.zeros(8, 2, trials),
-            "new": ls.zeros(8, 2, trials),
-            # Backward differences of order 0 to 3, see ``regress``, of both estimates, of the
-            # estimates N_b samples ago, and of both targets.
-            "estimate": taps,
-            "leaving": taps,
-            "target": taps,
-            "command": (zero, zero),
-            # Fits that were not used so far.
-            "held": zero,
-        }
+        return self.composed().init(trials)
 
     def delay_line(self, trials):
-        return DelayLine(self.nb, jnp.zeros((4, trials)), self.renew)
+        return self.composed().delay_line(trials)
 
     def step(self, state, seen):
-        left = seen.delayed
-        estimate, phi = regress(state["estimate"], seen.estimate_mm)
-        leaving, phi_leaving = regress(state["leaving"], left[:2])
-        target, phi_target = regress(state["target"], seen.target_mm)
-
-        # u(k-1) is the last command that the estimate at k can have felt.
-        applied = state["command"]
-        new = ls.add_observation(state["new"], phi, applied)
-        rows = ls.exchange_observation(state["rows"], phi, applied, phi_leaving, left[2:])
-        # The first fit waits until no row in the buffer reaches back before the first sample.
-        since_full, hop = seen.k - (self.nb + TAPS - 1), self.nb - self.no
-        due = (since_full >= 0) & (since_full % hop == 0)
-        normal = ls.pulled(rows, self.pull, self.anchor)
-        fitted, tolerance = ls.SOLVERS[self.solver](normal)
-        good = tolerance >= 1 / CONDITION_LIMIT  # false for NaN
-        held = state["held"] + jnp.where(due & ~good, 1.0, 0.0)
-        coefficients = choose(due & good, fitted, state["coefficients"])
-        command = tuple(
-            sum(c[i] * p for c, p in zip(coefficients, phi_target, strict=True)) for i in range(2)
-        )
-        state = {
-            "coefficients": coefficients,
-            "rows": rows,
-            "new": new,
-            "estimate": estimate,
-            "leaving": leaving,
-            "target": target,
-            "command": command,
-            "held": held,
-        }
-        decision = Decision(
-            command_mm=jnp.stack(command),
-            record=jnp.concatenate([seen.estimate_mm, jnp.stack(applied)]),
-            signals={"C_A": jnp.stack([jnp.stack(row) for row in coefficients]), "held": held},
-        )
-        return state, decision
-
-    @staticmethod
-    def renew(state):
-        """The fresh sum of the rows in the delay line replaces the sliding sum.
-
-        Adding and subtracting rows for ever would let round-off grow with the record; here every
-        sum is at most two lengths of the line old.
-        """
-        return state | {"rows": state["new"], "new": jax.tree.map(jnp.zeros_like, state["new"])}
+        return self.composed().step(state, seen)
 
 
 def _overlap(nb: int, value: float) -> int:
@@ -276,11 +213,3 @@ ENTRY = Entry(
     clash=_clash,
     look=1,
 )  # fmt: skip
-
-
-def choose(use, new, old):
-    """`new` where `use` (T,), else `old`: rows of coefficients, two arrays (T,) each."""
-    return tuple(
-        tuple(jnp.where(use, a, b) for a, b in zip(*rows, strict=True))
-        for rows in zip(new, old, strict=True)
-    )

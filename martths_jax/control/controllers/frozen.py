@@ -2,38 +2,60 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
-from martths_jax.control.adaptive.differences import TAPS, regress
+from martths_jax.control.adaptive.base import ACTUATORS, Coefficients, Law, Regressor
+from martths_jax.control.adaptive.differences import BackwardDifferences
+from martths_jax.control.adaptive.law import Linear
 from martths_jax.control.base import Controller, Decision
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class FrozenFeedforward(Controller):
-    """u(k) = C' phi_a(k), phi_a the backward differences of both target strokes (``regress``).
+    """u(k) = C' phi_a(k), phi_a the regressors of both target strokes.
 
     Attributes:
-        coefficients: (8, 2) or (8, 2, T), in scaled derivatives dt^j x^(j).
+        coefficients: (n, 2) or (n, 2, T).
         estimator: the filter that runs with it.
+        regressor: of the targets; by default backward differences, scaled derivatives dt^j x^(j).
+        joint: whether a command depends on both strokes.
+        law: the command from coefficients and target.
     """
 
     coefficients: jax.Array
     estimator: Any = None
+    regressor: Regressor = field(default=BackwardDifferences(), metadata={"static": True})
+    joint: bool = field(default=True, metadata={"static": True})
+    law: Law = field(default_factory=Linear)
 
     name = "frozen"
     shared_axes = MappingProxyType({"coefficients": 2})
 
     def init(self, trials):
-        return ((jnp.zeros(trials),) * (TAPS - 1),) * 2
+        return self.regressor.init(trials)
 
     def step(self, state, seen):
-        state, phi = regress(state, seen.target_mm)
+        state, phi = self.regressor.step(state, seen.target_mm)
         C = self.coefficients
-        command = [sum(C[j, i] * p for j, p in enumerate(phi)) for i in range(2)]
-        return state, Decision(command_mm=jnp.stack(command))
+        rows = tuple(tuple(C[j, i] for i in range(ACTUATORS)) for j in range(C.shape[0]))
+        return state, Decision(command_mm=jnp.stack(command(self.law, rows, phi, self.joint)))
+
+
+def command(law: Law, coefficients: Coefficients, phi: Sequence, joint: bool) -> tuple:
+    """Commands (T,) of a law.
+
+    Args:
+        law: which.
+        coefficients: n rows, one number an actuator.
+        phi: for each stroke its regressors of the target.
+        joint: whether a command depends on both strokes.
+    """
+    columns = [[row[i] for row in coefficients] for i in range(ACTUATORS)]
+    return law.command(columns, [sum(phi, ())] * ACTUATORS if joint else phi)
