@@ -79,8 +79,12 @@ class Plan:
 
     @property
     def counts(self) -> dict[str, str]:
-        """What the controllers count, in words by the names of their signals."""
-        signals = [s for c in self.controllers.values() for s in c.signals if s.count]
+        """What the controllers count, in words by the names of their signals.
+
+        What any of ours counts is always among it, so that all results have the same variables.
+        """
+        kinds = [*(entry.controller for entry in ENTRIES), *self.controllers.values()]
+        signals = [signal for kind in kinds for signal in kind.signals if signal.count]
         return {signal.name: signal.label or signal.name for signal in signals}
 
     @property

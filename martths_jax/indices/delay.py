@@ -148,7 +148,7 @@ def correlate(y: jax.Array, x: jax.Array, lags: tuple[int, int]) -> jax.Array:
         y_b = jax.lax.dynamic_slice_in_dim(y, b * block, block)
         x_b = jax.lax.dynamic_slice_in_dim(x, b * block, block + width - 1)
         # Row j of the total is lag `lag - j`.
-        return total + sum(y_b[i] * x_b[i : i + width] for i in range(block)), None
+        return total + sum(y_b[i][None] * x_b[i : i + width] for i in range(block)), None
 
     total, _ = jax.lax.scan(add, jnp.zeros((width, y.shape[1])), jnp.arange(blocks))
     return total[::-1]

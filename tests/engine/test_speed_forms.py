@@ -19,7 +19,7 @@ from martths_jax.algebra import least_squares as ls
 from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES, TAPS, BackwardDifferences
 from martths_jax.control.adaptive.window import Window
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
-from martths_jax.indices import NAMES, correlate, delay
+from martths_jax.indices import NAMES, Peak, Rms, correlate, delay
 from tests.engine.motions import burst
 
 #: Buffer and motion of other tests of this folder too, so that all use one compiled program.
@@ -161,7 +161,9 @@ def test_pieces_of_a_window_change_only_round_off(benchmark, monkeypatch):
         monkeypatch.setattr(loop, "PIECE", piece)
         blocks.compiled.cache_clear()
         sums = simulate(benchmark, controller, plants, MOTION).sums
-        return [np.asarray(x) for x in (sums.correlation, sums.error_square, sums.error_peak)]
+        sums = [sums.of(kind) for kind in (delay.Delay, Rms, Peak)]
+        names = ("correlation", "error_square", "error_peak")
+        return [np.asarray(x[name]) for x, name in zip(sums, names, strict=True)]
 
     whole, pieces = outcome(192), outcome(64)
     blocks.compiled.cache_clear()

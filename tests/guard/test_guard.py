@@ -13,11 +13,11 @@ from martths_jax import (
     Passthrough,
     SensorNoise,
     Status,
+    blocks,
     draw_plants,
     indices,
     nominal_plant,
     simulate,
-    simulation,
 )
 from martths_jax.algebra import least_squares as ls
 from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES
@@ -101,9 +101,9 @@ def test_a_fit_beyond_the_condition_limit_is_held(benchmark, monkeypatch):
     free = simulate(benchmark, controller, nominal_plant(), shaken, keep=True)
     assert free.counts["held"].tolist() == [0]
     monkeypatch.setattr(adfc, "CONDITION_LIMIT", 1.0)
-    simulation.compiled.cache_clear()
+    blocks.compiled.cache_clear()
     held = simulate(benchmark, controller, nominal_plant(), shaken, keep=True)
-    simulation.compiled.cache_clear()
+    blocks.compiled.cache_clear()
     assert held.counts["held"].tolist() == [len(range(80 + 4, 400))]
     assert np.all(held.signals["C_A"] == adfc.FOLLOW_TARGET)
     assert not np.allclose(free.signals["C_A"][0, -1], adfc.FOLLOW_TARGET)

@@ -1,6 +1,8 @@
 """Every index beside the benchmark's against NumPy on the signals of a run, and what it tells."""
 
+import re
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
@@ -22,6 +24,7 @@ from martths_jax.coupler import frame_to_actuator
 from martths_jax.indices import (
     BENCHMARK,
     DELAYS,
+    GROUPS,
     KNOWN,
     NAMES,
     FrequencyEvaluation,
@@ -213,6 +216,13 @@ def test_only_what_is_asked_for(benchmark):
     assert list(indices(one)) == ["J2_1", "J2_2", "TI_2"]
     assert not [o for o in one.sums.observers if o.pieces]  # no correlations to pay for
     assert [i.unit for i in one.sums.indices] == ["%", "%", "mm²"]
+
+
+def test_the_page_names_them_all():
+    text = (Path(__file__).resolve().parents[2] / "docs" / "indices.md").read_text("utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| ")]
+    words = {word for row in rows for word in re.findall(r"\w+", row)}
+    assert {index.group for index in KNOWN.values()} | set(GROUPS) <= words
 
 
 def test_the_table():

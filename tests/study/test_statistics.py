@@ -7,7 +7,7 @@ from scipy import stats
 
 from martths_jax import published
 from martths_jax.campaign.statistics import compare, percentile, proportion
-from martths_jax.indices import NAMES
+from martths_jax.indices import DELAYS, NAMES
 from martths_jax.study.summary import number, summarise
 
 
@@ -66,6 +66,7 @@ def dataset(trials: int = 50) -> xr.Dataset:
             "value": ((*cell, "index"), value),
             "status": (cell, status),
             "volt_peak": ((*cell, "actuator"), np.ones((2, 1, trials + 1, 2))),
+            "unit": ("index", ["ms" if n in DELAYS else "percent" for n in NAMES]),
         },
         {"controller": ["lqg", "adfc"], "motion": ["m"], "trial": t, "index": list(NAMES)},
         {"seed": 1},

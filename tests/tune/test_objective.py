@@ -16,6 +16,12 @@ def test_a_group_is_the_mean_of_its_indices():
     assert terms == ((0.5, "J2_1"), (0.5, "J2_2"), (0.5, "J8_26"))
 
 
+def test_any_index_of_the_table_can_be_tuned_for():
+    objective = Objective.parse("j2TRUE + 0.5*TI_1")
+    assert objective.names == ("J2true_1", "J2true_2", "TI_1")
+    assert [o.quantities for o in objective.observers(1024.0)[:-1]] == [("",), ("last", "rms")]
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
