@@ -67,6 +67,20 @@ static inline void add_row(v G[36], v h[16], const v phi[8], const v u[2], doubl
   }
 }
 
+/* Newest targets x and strokes y; products of y, LEAD samples late, with the last NLAG of x. */
+static inline void correlate(v cr[4][NLAG], v hx[2][NLAG], v hy[4][LEAD + 1], const v x[2],
+                             const v y[4]) {
+  for (int i = 0; i < 2; i++) {
+    memmove(&hx[i][1], &hx[i][0], sizeof(v) * (NLAG - 1));
+    hx[i][0] = x[i];
+  }
+  for (int i = 0; i < 4; i++) {
+    memmove(&hy[i][1], &hy[i][0], sizeof(v) * LEAD);
+    hy[i][0] = y[i];
+    for (int l = 0; l < NLAG; l++) cr[i][l] += hy[i][LEAD] * hx[i & 1][l];
+  }
+}
+
 /* One block of W trials: own arrays come as (..., W), shared ones as plain doubles. */
 void run(const Params *P, const double *ground, const double *ref, const double *noise,
          const double *pa, const double *pb, const double *pB, const double *pC,
@@ -191,16 +205,8 @@ void run(const Params *P, const double *ground, const double *ref, const double 
       es[i] += e * e; ts[i] += tar[i] * tar[i];
       ep[i] = vmax(ep[i], vabs(e)); tp[i] = vmax(tp[i], vabs(tar[i]));
     }
-    v yy[4] = {xm[0], xm[1], xh[0], xh[1]};
-    for (int i = 0; i < 2; i++) {
-      memmove(&hx[i][1], &hx[i][0], sizeof(v) * (NLAG - 1));
-      hx[i][0] = xa[i];
-    }
-    for (int i = 0; i < 4; i++) {
-      memmove(&hy[i][1], &hy[i][0], sizeof(v) * LEAD);
-      hy[i][0] = yy[i];
-      for (int l = 0; l < NLAG; l++) cr[i][l] += hy[i][LEAD] * hx[i & 1][l];
-    }
+    const v yy[4] = {xm[0], xm[1], xh[0], xh[1]};
+    correlate(cr, hx, hy, xa, yy);
     v kk = bc((double)k);
     for (int i = 0; i < 2; i++) {
       v vo = vabs(u[i] * volt[i] + volt[2 + i]);
@@ -228,6 +234,8 @@ void run(const Params *P, const double *ground, const double *ref, const double 
     }
     for (int i = 0; i < 2; i++) { q2[i] = q1[i]; q1[i] = q[i]; uprev[i] = u[i]; }
   }
+  const v nothing[4] = {0};
+  for (int k = 0; k < LEAD; k++) correlate(cr, hx, hy, nothing, nothing); /* what waited */
   for (int i = 0; i < 10; i++) {
     vu *o = (vu *)(sums + 4 * i * W);
     o[0] = es[i]; o[1] = ts[i]; o[2] = ep[i]; o[3] = tp[i];

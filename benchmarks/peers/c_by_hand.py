@@ -14,7 +14,9 @@ from job import LAGS, NEVER, Job, Sums
 
 SOURCE = Path(__file__).with_suffix(".c")
 LANES = 8
-FLAGS = "-O3 -march=native -mprefer-vector-width=512 -ffast-math -fno-finite-math-only".split()
+FLAGS = (
+    "-O3 -march=native -mprefer-vector-width=512 -ffast-math -fno-finite-math-only -Wno-psabi"
+).split()
 DOUBLES_16 = ctypes.c_double * 16
 
 

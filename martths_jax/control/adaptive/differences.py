@@ -10,7 +10,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from martths_jax.control.adaptive.base import ACTUATORS, Regressor, complaint, weighted
+from martths_jax.control.adaptive.arguments import complaint
+from martths_jax.control.adaptive.base import ACTUATORS, Regressor, weighted
 from martths_jax.once import once
 
 #: Highest order of a derivative, and of its accuracy: beyond, the numbers are all cancellation.

@@ -8,10 +8,8 @@ from types import MappingProxyType
 import jax
 
 from martths_jax.algebra import least_squares as ls
-from martths_jax.control.adaptive.base import (
+from martths_jax.control.adaptive.arguments import (
     MATRICES,
-    Fit,
-    Fitted,
     check_positive,
     check_shape,
     complaint,
@@ -19,6 +17,7 @@ from martths_jax.control.adaptive.base import (
     per_coefficient,
     per_part,
 )
+from martths_jax.control.adaptive.base import Fit, Fitted
 
 
 @jax.tree_util.register_dataclass

@@ -7,14 +7,13 @@ from types import MappingProxyType
 
 import jax
 
-from martths_jax.control.adaptive.base import (
+from martths_jax.control.adaptive.arguments import (
     SHAPES,
-    Fit,
-    Fitted,
     check_positive,
     check_shape,
     per_coefficient,
 )
+from martths_jax.control.adaptive.base import Fit, Fitted
 
 
 @jax.tree_util.register_dataclass

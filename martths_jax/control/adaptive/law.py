@@ -8,7 +8,8 @@ from types import MappingProxyType
 import jax
 import jax.numpy as jnp
 
-from martths_jax.control.adaptive.base import Law, check_positive, check_shape
+from martths_jax.control.adaptive.arguments import check_positive, check_shape
+from martths_jax.control.adaptive.base import Law
 
 
 @jax.tree_util.register_dataclass

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import jax.numpy as jnp
 
-from martths_jax.control.adaptive.base import Piece, complaint
+from martths_jax.control.adaptive.arguments import complaint
+from martths_jax.control.adaptive.base import Piece
 
 
 @dataclass(frozen=True)

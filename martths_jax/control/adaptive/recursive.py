@@ -14,17 +14,15 @@ from types import MappingProxyType
 import jax
 import jax.numpy as jnp
 
-from martths_jax.control.adaptive.base import (
+from martths_jax.control.adaptive.arguments import (
     MATRICES,
-    Fit,
-    Fitted,
     check_positive,
     check_shape,
-    choose,
     complaint,
     known,
     per_part,
 )
+from martths_jax.control.adaptive.base import Fit, Fitted, choose
 
 
 class _Corrected(Fit):

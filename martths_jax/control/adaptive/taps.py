@@ -8,7 +8,8 @@ from functools import cached_property
 import jax.numpy as jnp
 import numpy as np
 
-from martths_jax.control.adaptive.base import ACTUATORS, Regressor, complaint, weighted
+from martths_jax.control.adaptive.arguments import complaint
+from martths_jax.control.adaptive.base import ACTUATORS, Regressor, weighted
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from martths_jax.algebra import least_squares as ls
-from martths_jax.control.adaptive.base import Fit, Fitted, complaint, known
+from martths_jax.control.adaptive.arguments import complaint, known
+from martths_jax.control.adaptive.base import Fit, Fitted
 from martths_jax.resources import available_memory
 
 #: Memory of a row of the buffer for trials side by side, with the inputs of a window [bytes].

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from martths_jax.algebra import least_squares as ls
-from martths_jax.control.adaptive.base import known
+from martths_jax.control.adaptive.arguments import known
 from martths_jax.control.adaptive.differences import BackwardDifferences
 from martths_jax.control.adaptive.guards import ConditionGate, Pull
 from martths_jax.control.adaptive.inverse import nominal_inverse

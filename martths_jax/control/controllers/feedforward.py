@@ -17,6 +17,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from martths_jax.control.adaptive.arguments import (
+    check_positive,
+    check_shape,
+    complaint,
+    per_coefficient,
+)
 from martths_jax.control.adaptive.base import (
     ACTUATORS,
     Fit,
@@ -25,12 +31,8 @@ from martths_jax.control.adaptive.base import (
     Pair,
     Part,
     Regressor,
-    check_positive,
-    check_shape,
     choose,
-    complaint,
     parts_of,
-    per_coefficient,
 )
 from martths_jax.control.adaptive.differences import BackwardDifferences
 from martths_jax.control.adaptive.law import Linear

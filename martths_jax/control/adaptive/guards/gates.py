@@ -10,13 +10,8 @@ import jax
 import jax.numpy as jnp
 
 from martths_jax.algebra import least_squares as ls
-from martths_jax.control.adaptive.base import (
-    MATRICES,
-    Guard,
-    check_positive,
-    check_shape,
-    per_part,
-)
+from martths_jax.control.adaptive.arguments import MATRICES, check_positive, check_shape, per_part
+from martths_jax.control.adaptive.base import Guard
 from martths_jax.control.adaptive.guards.noise import noise_covariance, noise_problems
 
 

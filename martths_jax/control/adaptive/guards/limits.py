@@ -9,14 +9,14 @@ from types import MappingProxyType
 import jax
 import jax.numpy as jnp
 
-from martths_jax.control.adaptive.base import (
+from martths_jax.control.adaptive.arguments import (
     SHAPES,
-    Guard,
     check_shape,
     complaint,
     known,
     per_coefficient,
 )
+from martths_jax.control.adaptive.base import Guard
 
 
 @jax.tree_util.register_dataclass

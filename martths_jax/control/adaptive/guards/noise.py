@@ -10,7 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from martths_jax.algebra import least_squares as ls
-from martths_jax.control.adaptive.base import ACTUATORS, Guard, check_shape, known, per_part
+from martths_jax.control.adaptive.arguments import check_shape, known, per_part
+from martths_jax.control.adaptive.base import ACTUATORS, Guard
 
 #: Samples after which the filter has forgotten a single noisy one.
 REMEMBERED = 6000

@@ -8,14 +8,14 @@ from types import MappingProxyType
 import jax
 
 from martths_jax.algebra import least_squares as ls
-from martths_jax.control.adaptive.base import (
+from martths_jax.control.adaptive.arguments import (
     MATRICES,
-    Guard,
     check_positive,
     check_shape,
     per_coefficient,
     per_part,
 )
+from martths_jax.control.adaptive.base import Guard
 
 
 @jax.tree_util.register_dataclass
