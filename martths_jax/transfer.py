@@ -24,6 +24,11 @@ FRAME_POLE_HZ = complex(-50.0, 63.0)
 NOMINAL_GAIN = np.array([[2165.2, 4.5394e6], [349.95, 1.9238e7]])
 
 
+#: Real and complex poles are combined here, whatever the caller allows elsewhere.
+_mixing = jax.numpy_dtype_promotion("standard")
+
+
+@_mixing
 def _factors(parameters_hz: jax.Array, xp=jnp):
     """Zeros, real poles, frame pole [rad/s] and rescaled gains of a batch of plants.
 
@@ -52,6 +57,7 @@ def _factors(parameters_hz: jax.Array, xp=jnp):
     return zeros, poles, frame, gain
 
 
+@_mixing
 def frequency_response(parameters_hz, frequency_hz) -> jax.Array:
     """H(j 2 pi f) of a batch of plants.
 
@@ -76,6 +82,7 @@ def frequency_response(parameters_hz, frequency_hz) -> jax.Array:
     return xp.stack([xp.stack([entry(i, j) for j in range(2)], 1) for i in range(2)], 1)
 
 
+@_mixing
 def continuous_modes(parameters_hz: jax.Array):
     """Partial fractions of a batch of plants.
 

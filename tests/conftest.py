@@ -16,8 +16,14 @@ if not os.environ.get("MARTHS_TEST_OPTIMISED"):
     quick = "--xla_backend_optimization_level=0"
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {quick}".strip()
 
+import jax
+
 import martths_jax  # before any test touches JAX: it switches float64 on
 from martths_jax import blocks, runtime
+
+# Arrays of other ranks or types are never combined by chance.
+jax.config.update("jax_numpy_rank_promotion", "raise")
+jax.config.update("jax_numpy_dtype_promotion", "strict")
 
 SIBLING = Path(__file__).resolve().parents[2] / "shared" / "benchmark"
 
