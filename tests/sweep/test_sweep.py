@@ -193,6 +193,7 @@ def test_the_dataset_is_labelled_and_reads_back(whole):
     with (whole.folder / "sweep.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 9 * 2 * (TRIALS + 1)
+    assert {r["J2_1"] for r in rows if r["scale"] == "2000.0"} == {""}, "every trial was lost"
     row = next(r for r in rows if (r["scale"], r["noise_power"], r["motion"], r["trial"]) == (
         "0.5", "3e-07", "two", "7"))  # fmt: skip
     there = whole.dataset.value.sel(scale=0.5, noise_power=3e-7, motion="two", trial=7)
