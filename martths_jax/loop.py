@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 
 from martths_jax.benchmark import Benchmark
-from martths_jax.control.base import Controller
+from martths_jax.control.base import Controller, DelayLine
 from martths_jax.control.compensator import Compensator, CompensatorState
 from martths_jax.coupler import actuator_to_frame, frame_to_actuator
 from martths_jax.observers import Observer
@@ -232,11 +232,7 @@ def run(
         body = jax.checkpoint(piece, prevent_cse=False) if segment else piece
         (state, seen), outputs = jax.lax.scan(body, carry, jax.tree.map(cut, inputs))
         records, emitted = jax.tree.map(join, outputs)
-        if line and line.renew:
-            box = state.compensator
-            box = replace(box, controller=line.renew(box.controller))
-            state = replace(state, compensator=box)
-        return (records, (state, seen)), emitted
+        return (records, (_renewed(state, line), seen)), emitted
 
     empty = lambda x: jnp.zeros((length, *x.shape), x.dtype)  # noqa: E731
     records = jax.tree.map(empty, line.blank if line else None)
@@ -252,6 +248,14 @@ def run(
     whole = lambda x: x.reshape(windows * length, *x.shape[2:])[:rows]  # noqa: E731
     finished = (observer.finish(one) for observer, one in zip(observers, seen, strict=True))
     return tuple(finished), jax.tree.map(whole, emitted)
+
+
+def _renewed(state: LoopState, line: DelayLine | None) -> LoopState:
+    """The state after the delay line has gone through once."""
+    if line is None or line.renew is None:
+        return state
+    box = state.compensator
+    return replace(state, compensator=replace(box, controller=line.renew(box.controller)))
 
 
 def _in_windows(x: jax.Array, windows: int, length: int) -> jax.Array:

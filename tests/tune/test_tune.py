@@ -269,8 +269,8 @@ def test_controllers_that_cannot_be_tuned(given, words):
 
 
 def test_a_setting_that_only_the_constructor_takes_is_refused_before_compiling(benchmark, tmp_path):
-    options = Options("lqg{error=measured}", "j2")
-    with pytest.raises(InputError, match="cannot be tuned with error set"):
+    options = Options("lqg{allow_unstable=true}", "j2")
+    with pytest.raises(InputError, match="cannot be tuned with allow_unstable set"):
         tune(benchmark, options, [], tmp_path)
 
 
@@ -283,3 +283,12 @@ def test_an_entry_without_a_start_asks_for_one(tmp_path):
         assert tuned(f"{Lead.__module__}:MINE", {"lead": 0.01}).start == {"lead": 0.01}
     finally:
         del guests.MINE
+
+
+def test_settings_stay_while_numbers_move(benchmark):
+    for text, name, value in (("lqg{error=measured}", "error", "measured"),
+                              ("adfc{towards=start,nb=64,no=63}", "towards", "start")):  # fmt: skip
+        one = tuned(text)
+        at = one.coordinates(one.start)
+        assert getattr(one.build(benchmark, at), name) == value
+        assert getattr(one.on_host(benchmark, at), name) == value

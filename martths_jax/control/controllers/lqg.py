@@ -155,8 +155,14 @@ class LQG(Controller):
 def _pairs(w) -> dict:
     """Settings of ``LQG.design`` that mean the same as the tuned numbers."""
     # What a tuning has found is shown even if it runs away in the end.
-    return {"e": (w["e1"], w["e2"]), "r": (1.0, w["r2"]), "y": (w["y1"], w["y2"]), "q": w["q"],
-            "allow_unstable": True}  # fmt: skip
+    found = {"e": (w["e1"], w["e2"]), "r": (1.0, w["r2"]), "y": (w["y1"], w["y2"]), "q": w["q"],
+             "allow_unstable": True}  # fmt: skip
+    return found | {name: value for name, value in w.items() if name not in WEIGHTS}
+
+
+def _traced(benchmark, error: str = "estimate", **values) -> LQG:
+    logs = {name: jnp.log10(value) for name, value in values.items()}
+    return lqg_from_weights(benchmark, logs, error)
 
 
 def _tuned() -> tuple[Parameter, ...]:
@@ -187,9 +193,7 @@ ENTRY = Entry(
         Parameter("allow_unstable", "", "take designs that run away", False, kind="static"),
     ),
     tuned=_tuned(),
-    traced=lambda benchmark, **values: lqg_from_weights(
-        benchmark, {name: jnp.log10(value) for name, value in values.items()}
-    ),
+    traced=_traced,
     settings_from=_pairs,
     look=0,
 )  # fmt: skip
