@@ -73,11 +73,11 @@ def frequency_response(parameters_hz, frequency_hz) -> jax.Array:
     s = 2j * xp.pi * xp.asarray(frequency_hz)[:, None]
 
     def entry(i, j):
-        numerator = gain[i][j] * xp.ones_like(s)
+        numerator = gain[i][j][None] * xp.ones_like(s)
         for z in zeros[i][j]:
-            numerator = numerator * (s - z)
-        p, q = poles[j]
-        return numerator / ((s - p) * (s - q) * (s - frame) * (s - frame.conj()))
+            numerator = numerator * (s - z[None])
+        p, q, pair = poles[j][0][None], poles[j][1][None], frame[None]
+        return numerator / ((s - p) * (s - q) * (s - pair) * (s - pair.conj()))
 
     return xp.stack([xp.stack([entry(i, j) for j in range(2)], 1) for i in range(2)], 1)
 

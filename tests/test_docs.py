@@ -68,6 +68,14 @@ def short(monkeypatch):
     monkeypatch.setattr(load, "with_quiet_tail", lambda record, tail: record)
 
 
+@pytest.fixture
+def as_users_run_it():
+    """Without the strict rules that this package's own tests run under."""
+    with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):
+        yield
+
+
+@pytest.mark.usefixtures("as_users_run_it")
 @pytest.mark.parametrize("page", WITH_CODE, ids=named)
 def test_python_runs(page, short, tmp_path, tmp_path_factory, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

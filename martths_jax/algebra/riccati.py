@@ -100,9 +100,9 @@ def _eliminate(A, b):
         size = jnp.where(rows[:, 0] >= j, jnp.abs(M[:, j]), -1.0)
         pivot = jnp.argmax(size)
         top = M[pivot]
-        M = jnp.where(rows == pivot, M[j], M)
+        M = jnp.where(rows == pivot, M[j][None], M)
         top = top / top[j]
-        return jnp.where(rows == j, top, M - M[:, j][:, None] * top)
+        return jnp.where(rows == j, top[None], M - M[:, j][:, None] * top[None])
 
     return jax.lax.fori_loop(0, n, column, jnp.concatenate([A, b], axis=1))[:, n:]
 
@@ -124,7 +124,7 @@ def _care(A, G, Q):
         residual = A.T @ X + X @ A - X @ G @ X + Q
         return _symmetric(X + lyapunov((A - G @ X).T, residual))
 
-    return jax.lax.fori_loop(0, NEWTON_STEPS, newton, X) / (d[:, None] * d)
+    return jax.lax.fori_loop(0, NEWTON_STEPS, newton, X) / (d[:, None] * d[None])
 
 
 @_care.defjvp
@@ -146,7 +146,7 @@ def _dare(A, G, Q):
         return _symmetric(X + stein(closed.T, residual))
 
     X = jax.lax.fori_loop(0, NEWTON_STEPS, newton, _doubling(A, G, Q))
-    return X / (d[:, None] * d)
+    return X / (d[:, None] * d[None])
 
 
 @_dare.defjvp
@@ -203,7 +203,7 @@ def _balancing(A, G, Q):
 
 
 def _scaled(d, A, G, Q):
-    return A * d / d[:, None], G / (d[:, None] * d), Q * (d[:, None] * d)
+    return A * d[None] / d[:, None], G / (d[:, None] * d[None]), Q * (d[:, None] * d[None])
 
 
 def _symmetric(X):

@@ -11,6 +11,7 @@ ENGINE_MODULES = (
     "campaign/lanes.py",
     "control/*.py",
     "control/*/*.py",
+    "control/*/*/*.py",
     "coupler.py",
     "indices/*.py",
     "loop.py",

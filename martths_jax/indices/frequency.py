@@ -93,6 +93,7 @@ class FrequencyEvaluation(Kind):
         )
         return {"real": spectra.real, "imaginary": spectra.imag}
 
+    @jax.numpy_dtype_promotion("standard")  # spectra and real weights
     def result(self, state):
         spectra = state["real"] + 1j * state["imaginary"]  # (F, rows, T)
         xp = library(spectra)

@@ -12,7 +12,7 @@ from martths_jax.control.controllers import ENTRIES
 from martths_jax.control.entry import Entry
 from martths_jax.errors import InputError, raise_all
 from martths_jax.indices import choose
-from martths_jax.indices.table import shown_of
+from martths_jax.indices.table import KNOWN, shown_of
 from martths_jax.motions import Motion
 from martths_jax.published import PROPOSED
 from martths_jax.sweep.axes import Axis, make_axes
@@ -72,10 +72,9 @@ def make_sweep(
         problems.append(str(error))
     found, bad = make_axes(axes, _entries(study))
     problems += bad
-    if study is not None:
-        names = [index.name for index in choose(study.indices)]
-        shown = shown_of(shown, SHOWN, names)
-        problems += unknown_names([n for n in shown if n not in names], names, "Index")
+    names = list(KNOWN) if study is None else [index.name for index in choose(study.indices)]
+    shown = shown_of(shown, SHOWN, names)
+    problems += unknown_names([n for n in shown if n not in names], names, "Index")
     grid = Grid(found, {})
     if study is not None:
         problems += _clashes(found, study)

@@ -70,7 +70,8 @@ def test_the_delay_line_comes_out_n_samples_later(benchmark):
         state, _, _ = box.decide(observed, jnp.asarray(rng.standard_normal((2, 2))))
     assert int(state.k) == 30
     # Renewed at 9, 18 and 27: the fresh sums hold the last three rows only.
-    assert float(state.controller["new"][0][0][0]) < float(state.controller["rows"][0][0][0])
+    (sums,) = state.controller["fits"]
+    assert float(sums["new"][0][0][0]) < float(sums["rows"][0][0][0])
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -47,7 +47,8 @@ def test_an_error_that_does_not_exist(benchmark):
 def test_a_study_names_the_weights_it_ran_with(benchmark):
     """Those left out too: they identify its results."""
     config = StudyConfig(controller={"lqg": {"error": "measured", "q": 1e-4}})
-    made, settings = build_controller("lqg", config, benchmark)
+    chosen = build_controller("lqg", config, benchmark)
+    made, settings = chosen.controller, chosen.identity
     wanted = FITTED["measured"] | {"q": 1e-4}
     assert made.error == settings["error"] == "measured"
     assert {n: settings[n] for n in "eryq"} == {

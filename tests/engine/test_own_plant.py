@@ -88,7 +88,9 @@ def test_draws_about_a_plant(own):
     usual = draw_plants(40, seed=3)
     np.testing.assert_array_equal(drawn.draws, usual.draws)
     np.testing.assert_allclose(
-        drawn.parameters_hz / SLOWER, np.asarray(usual.parameters_hz) / NOMINAL_HZ, rtol=1e-14
+        np.asarray(drawn.parameters_hz) / SLOWER,
+        np.asarray(usual.parameters_hz) / NOMINAL_HZ,
+        rtol=1e-14,
     )
     np.testing.assert_array_equal(
         drawn[[3, 5]].parameters_hz, np.asarray(drawn.parameters_hz)[[3, 5]]

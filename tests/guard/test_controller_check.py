@@ -186,6 +186,14 @@ def marked(controller, trials) -> list[bool]:
     return list(check_controller(controller, DT, trials))
 
 
+@pytest.fixture
+def as_users_write_it():
+    """A number a trial (T,) on (2, T) strokes."""
+    with jax.numpy_rank_promotion("allow"):
+        yield
+
+
+@pytest.mark.usefixtures("as_users_write_it")
 def test_which_arrays_hold_one_value_a_trial(benchmark):
     scalar, taps = np.asarray(2.0), np.ones(5)
     assert marked(Gain(scalar, taps), 5) == [False, False]
@@ -215,6 +223,7 @@ def test_a_number_of_values_that_is_not_that_of_the_trials(benchmark):
         simulate(benchmark, wide, plants, motion)
 
 
+@pytest.mark.usefixtures("as_users_write_it")
 def test_a_controller_may_say_what_its_axes_are():
     said = type("Said", (Gain,), {"shared_axes": MappingProxyType({"gain": 0, "taps": 1})})
     said = jax.tree_util.register_dataclass(dataclass(frozen=True)(said))

@@ -158,5 +158,5 @@ def test_a_sweep(tmp_path):
     value = swept.dataset.value.sel(index="mean_1").values
     np.testing.assert_allclose(value[1] / value[0], 2.0, rtol=0.2)  # the noise stays
     head = (tmp_path / "sweep" / "sweep.csv").read_text("utf-8").splitlines()[0]
-    assert head.endswith("status,J2true_1,J2true_2,J3true_1,J3true_2,mean_1,mean_2")
+    assert head.endswith("status,held,J2true_1,J2true_2,J3true_1,J3true_2,mean_1,mean_2")
     assert list((tmp_path / "sweep" / "figures").glob("*.pdf"))

@@ -15,6 +15,7 @@ from martths_jax.campaign.session import header
 from martths_jax.campaign.store import RunFolder
 from martths_jax.cli import main, motions, nominal, tune
 from martths_jax.cli.console import accept_any_text, console
+from martths_jax.indices import choose
 from martths_jax.motions import MotionInfo
 from martths_jax.screen import ScreenTable
 from martths_jax.study.runner import write_results
@@ -146,8 +147,9 @@ def test_bars_cut_nothing(width):
 
 def test_the_run_command_prints_all_indices(monkeypatch, capsys):
     values = {f"J{i}_1": np.array([-1234.5678 + i]) for i in range(24)}
-    monkeypatch.setattr(nominal, "indices", lambda _: values)
-    result = type("R", (), {"controller": "adfc", "motion": "kobe-like"})()
+    monkeypatch.setattr(nominal, "evaluate", lambda _: values)
+    sums = type("S", (), {"indices": choose()})
+    result = type("R", (), {"controller": "adfc", "motion": "kobe-like", "sums": sums})()
     monkeypatch.setattr(console, "width", 60)
     nominal._print_indices(result)
     text = capsys.readouterr().out

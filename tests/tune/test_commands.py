@@ -105,4 +105,4 @@ def test_a_controller_of_a_file_is_tuned_and_goes_on_by_its_configuration(tmp_pa
     assert len(rows) == 26 and {row["published"] for row in rows} == {""}
     assert float(rows[2]["tuned"]) < float(rows[2]["start"]), "J2_1"
     design = json.loads((out / "design.json").read_text())
-    assert design["controller"].endswith("guest.py:Lead") and design["lead"] > 0.002
+    assert design["controller"] == "lead" and design["lead"] > 0.002

@@ -160,7 +160,8 @@ def _pairs(w) -> dict:
     return found | {name: value for name, value in w.items() if name not in WEIGHTS}
 
 
-def _traced(benchmark, error: str = "estimate", **values) -> LQG:
+def _traced(benchmark, *, e1, e2, r2, y1, y2, q, error: str = "estimate") -> LQG:
+    values = {"e1": e1, "e2": e2, "r2": r2, "y1": y1, "y2": y2, "q": q}
     logs = {name: jnp.log10(value) for name, value in values.items()}
     return lqg_from_weights(benchmark, logs, error)
 
@@ -222,9 +223,9 @@ def lqg_from_weights(
     n = C.shape[1]
     blank, one = jnp.zeros((n, 2)), jnp.ones(())
     strokes = C.T @ (jnp.stack([w["y1"], w["y2"]])[:, None] * C)
-    errors = jnp.eye(2) * jnp.stack([w["e1"], w["e2"]])
+    errors = jnp.diag(jnp.stack([w["e1"], w["e2"]]))
     Q = jnp.block([[strokes, blank], [blank.T, errors]])
-    R = jnp.eye(2) * jnp.stack([one, w["r2"]])
+    R = jnp.diag(jnp.stack([one, w["r2"]]))
     K_z, K_e = tracking_gains(benchmark, Q, R)
     estimator = KalmanFilter(benchmark.plant_model, kalman_gain(benchmark, w["q"]))
     return LQG(K_z=K_z, K_e=K_e, estimator=estimator, error=error)
