@@ -11,10 +11,10 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 
-from martths_jax.benchmark import Benchmark, build_benchmark
+from martths_jax.benchmark import Benchmark
 from martths_jax.campaign.config import StudyConfig
 from martths_jax.campaign.engine import Engine, Outcome
-from martths_jax.campaign.plan import Plan, motion_names, study_motion
+from martths_jax.campaign.plan import Plan, motion_names, study_benchmark, study_motion
 from martths_jax.coupler import build_coupler
 from martths_jax.motions import Motion
 from martths_jax.plant import Plants
@@ -109,9 +109,7 @@ class Worlds:
         if key not in self._benchmarks:
             shape = {"alpha_deg": alpha, "arm": p}
             coupler = build_coupler(**{k: v for k, v in shape.items() if v is not None})
-            self._benchmarks[key] = build_benchmark(
-                fs, self.config.integrator, partition=self.config.partition, coupler=coupler
-            )
+            self._benchmarks[key] = study_benchmark(replace(self.config, fs=fs), coupler)
         return self._benchmarks[key]
 
     def motions(self, fs: float, scale: float | None) -> tuple[Motion, ...]:

@@ -17,6 +17,7 @@ from martths_jax.control.base import Controller
 from martths_jax.control.controllers import ENTRIES
 from martths_jax.control.entry import Entry
 from martths_jax.control.registry import find, find_class, names
+from martths_jax.coupler import Coupler
 from martths_jax.errors import InputError, raise_all
 from martths_jax.files import name_problems
 from martths_jax.indices import Index, choose
@@ -121,7 +122,7 @@ def build_plan(config: StudyConfig) -> Plan:
         except InputError as error:
             problems.append(str(error))
 
-    benchmark = attempt(_benchmark, config)
+    benchmark = attempt(study_benchmark, config)
     motions = [attempt(study_motion, name, config) for name in motion_names(config, attempt)]
     chosen = {}
     problems += _unknown_tables(config)
@@ -155,10 +156,12 @@ def given_name(given) -> str:
     return given.name if isinstance(given, Controller) else given
 
 
-def _benchmark(config: StudyConfig) -> Benchmark:
+def study_benchmark(config: StudyConfig, coupler: Coupler | None = None) -> Benchmark:
+    """The benchmark of a configuration, with another coupler if one is given."""
     return build_benchmark(
-        config.fs, config.integrator, partition=config.partition, force_from=config.force_from
-    )
+        config.fs, config.integrator, partition=config.partition, force_from=config.force_from,
+        coupler=coupler,
+    )  # fmt: skip
 
 
 def motion_names(config: StudyConfig, attempt) -> tuple:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from martths_jax.benchmark import VOLT_LIMIT, build_benchmark
+from martths_jax.benchmark import VOLT_LIMIT
 from martths_jax.campaign.config import as_settings, make_config
 from martths_jax.campaign.draws import make_draws
-from martths_jax.campaign.plan import study_motion
+from martths_jax.campaign.plan import study_benchmark, study_motion
 from martths_jax.campaign.provenance import command_line
 from martths_jax.campaign.template import write_config
 from martths_jax.cli.console import console, error_console
@@ -101,7 +101,7 @@ def tune(
     if not quiet:
         for text in (text for motion in (*tuned_on, unseen) for text in motion.notices):
             _notice(text)
-    benchmark = build_benchmark(study.fs, study.integrator, partition=study.partition)
+    benchmark = study_benchmark(study)
     draws = make_draws(study)
     options = replace(options, trials=draws.trials)
     noise = SensorNoise(study.noise_power, study.noise_shared, study.seed)
