@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -129,6 +129,35 @@ class Kind(Observer):
             other = (reference if target == REFERENCE else signals[target])[target_rows]
             found.append((one, jnp.broadcast_to(other, one.shape)))
         return found
+
+
+class Running(Kind):
+    """Two running numbers a pair: of its errors, then of its targets.
+
+    A subclass names them by ``held`` and says by ``more`` how a sample changes one.
+    """
+
+    held: ClassVar[tuple[str, str]]
+
+    @staticmethod
+    def more(total: jax.Array, x: jax.Array) -> jax.Array:
+        """The number after a sample's x (rows, T), zero where the sample does not count."""
+        raise NotImplementedError
+
+    def init(self, trials):
+        return self.blank(trials, 2)
+
+    def add(self, state, signals, reference, k, valid):
+        found = []
+        for (errors, targets), (value, target) in zip(
+            state, self.compared(signals, reference), strict=True
+        ):
+            error, target = (jnp.where(valid, x, 0.0) for x in (value - target, target))
+            found.append((self.more(errors, error), self.more(targets, target)))
+        return tuple(found)
+
+    def finish(self, state):
+        return joined(state, self.held)
 
 
 def joined(groups, names: Sequence[str]) -> dict[str, jax.Array]:

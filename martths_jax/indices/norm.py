@@ -8,32 +8,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax.numpy as jnp
-
-from martths_jax.indices.base import Kind, joined, library
+from martths_jax.indices.base import Running, library
 
 DOUBLINGS_OF_POWER = 4
 POWER = 2**DOUBLINGS_OF_POWER
 
 
 @dataclass(frozen=True, kw_only=True)
-class Norm(Kind):
+class Norm(Running):
     """The p-norm, p = ``POWER`` [%]."""
 
-    def init(self, trials):
-        return self.blank(trials, 2)
+    held = ("error_power", "target_power")
 
-    def add(self, state, signals, reference, k, valid):
-        found = []
-        for (errors, targets), (value, target) in zip(
-            state, self.compared(signals, reference), strict=True
-        ):
-            error, target = (jnp.where(valid, x, 0.0) for x in (value - target, target))
-            found.append((errors + _power(error), targets + _power(target)))
-        return tuple(found)
-
-    def finish(self, state):
-        return joined(state, ("error_power", "target_power"))
+    @staticmethod
+    def more(total, x):
+        return total + _power(x)
 
     def result(self, state):
         xp = library(state["error_power"])

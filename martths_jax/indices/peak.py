@@ -6,31 +6,19 @@ from dataclasses import dataclass
 
 import jax.numpy as jnp
 
-from martths_jax.indices.base import TINY, Kind, joined, library
+from martths_jax.indices.base import TINY, Running, library
 from martths_jax.indices.norm import Norm
 
 
 @dataclass(frozen=True, kw_only=True)
-class Peak(Kind):
+class Peak(Running):
     """J3, J6, J9, J10 of the benchmark [%]."""
 
-    def init(self, trials):
-        return self.blank(trials, 2)
+    held = ("error_peak", "target_peak")
 
-    def add(self, state, signals, reference, k, valid):
-        found = []
-        for (errors, targets), (value, target) in zip(
-            state, self.compared(signals, reference), strict=True
-        ):
-            error = jnp.where(valid, value - target, 0.0)
-            target = jnp.where(valid, target, 0.0)
-            found.append(
-                (jnp.maximum(errors, jnp.abs(error)), jnp.maximum(targets, jnp.abs(target)))
-            )
-        return tuple(found)
-
-    def finish(self, state):
-        return joined(state, ("error_peak", "target_peak"))
+    @staticmethod
+    def more(total, x):
+        return jnp.maximum(total, jnp.abs(x))
 
     def smooth(self):
         return Norm()
