@@ -17,7 +17,7 @@ import numpy as np
 
 from martths_jax.campaign.fields import is_number, is_positive
 from martths_jax.control.controllers import ENTRIES
-from martths_jax.control.entry import Entry
+from martths_jax.control.entry import Entry, Parameter
 from martths_jax.errors import InputError
 
 
@@ -71,11 +71,7 @@ def scalars(entries: Iterable[Entry] = ENTRIES) -> dict[str, Scalar]:
     """
     found: dict[str, Scalar] = {}
     for entry in entries:
-        about = {p.name: p for p in entry.parameters} | {
-            d.name: d.as_parameter for d in entry.derived
-        }
-        for name, of in own_names(entry).items():
-            one = next(p for p in about.values() if name in (*_names(entry, p), p.name))
+        for name, (of, one) in own_axes(entry).items():
             wanted = one.wanted.partition(" (")[0]
             found.setdefault(
                 name, Scalar(of, one.good, wanted, one.unit, one.title, one.whole, True)
@@ -83,18 +79,17 @@ def scalars(entries: Iterable[Entry] = ENTRIES) -> dict[str, Scalar]:
     return found | STUDY
 
 
-def own_names(entry: Entry) -> dict[str, str]:
-    """Axes of an entry -> the parameter that each sets.
+def own_axes(entry: Entry) -> dict[str, tuple[str, Parameter]]:
+    """Axes of an entry -> the parameter that each sets, and what its values are."""
+    plain = {
+        apart(entry, p.axis or p.name): (p.name, p) for p in entry.parameters if p.is_number
+    }
+    return plain | {d.name: (d.of, d.as_parameter) for d in entry.derived}
 
-    A parameter that is called like an axis of the study is CONTROLLER.PARAMETER as an axis.
-    """
-    found = {name: p.name for p in entry.parameters if p.is_number for name in _names(entry, p)}
-    return found | {d.name: d.of for d in entry.derived}
 
-
-def _names(entry: Entry, parameter) -> tuple[str, ...]:
-    name = parameter.axis or parameter.name
-    return (f"{entry.name}.{name}" if name in STUDY else name,)
+def apart(entry: Entry, name: str) -> str:
+    """The name of a parameter, as CONTROLLER.PARAMETER where an axis of the study is called so."""
+    return f"{entry.name}.{name}" if name in STUDY else name
 
 
 def ways(entries: Iterable[Entry]) -> dict[str, tuple[str, ...]]:

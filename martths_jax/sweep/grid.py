@@ -16,7 +16,7 @@ from martths_jax.campaign.config import StudyConfig
 from martths_jax.control.entry import Entry
 from martths_jax.control.registry import find
 from martths_jax.errors import InputError
-from martths_jax.sweep.axes import Axis, own_names
+from martths_jax.sweep.axes import STUDY, Axis, apart, own_axes
 
 #: Settings of a study that may differ from lane to lane; all others shape a batch.
 LANE = ("noise_power",)
@@ -96,11 +96,10 @@ def entry_for(name: str, config: StudyConfig) -> Entry:
     return find(kind_of(name, config)).entry
 
 
-def settings_of(name: str, config: StudyConfig) -> dict:
-    """Settings of a controller: those of its table, else the defaults of its kind."""
+def settings_of(name: str, entry: Entry, config: StudyConfig) -> dict:
+    """Settings of a controller: those of its table, else the defaults of its entry."""
     table = config.controller.get(name, {})
-    own = {k: v for k, v in table.items() if k != "kind"}
-    return entry_for(name, config).defaults | own
+    return entry.defaults | {k: v for k, v in table.items() if k != "kind"}
 
 
 def build_grid(axes: tuple[Axis, ...], config: StudyConfig) -> tuple[Grid, list[str]]:
@@ -113,13 +112,13 @@ def build_grid(axes: tuple[Axis, ...], config: StudyConfig) -> tuple[Grid, list[
             entry = entry_for(controller, config)
         except InputError:
             continue  # build_plan says so
-        found = []
+        found, own = [], settings_of(controller, entry, config)
         for place in itertools.product(*(axis.values for axis in axes)):
-            job, sentences = _job(controller, entry, axes, place, config)
+            job, sentences = _job(controller, entry, own, axes, place, config.fs)
             found.append(job)
             problems += sentences
         jobs[controller] = tuple(found)
-        felt |= {axis.name for axis in axes} & set(own_names(entry))
+        felt |= {axis.name for axis in axes} & set(own_axes(entry))
         problems += _alike(axes, entry, jobs[controller])
     for axis in axes:
         if jobs and axis.name not in felt:
@@ -129,13 +128,13 @@ def build_grid(axes: tuple[Axis, ...], config: StudyConfig) -> tuple[Grid, list[
     return Grid(axes, jobs), list(dict.fromkeys(problems))
 
 
-def _job(controller: str, entry: Entry, axes, place, config) -> tuple[Job, list[str]]:
-    """What a controller runs in a cell, and sentences if it cannot be."""
-    own = settings_of(controller, config)
+def _job(controller: str, entry: Entry, own: dict, axes, place, fs) -> tuple[Job, list[str]]:
+    """What a controller with its own settings runs in a cell, and sentences if it cannot be."""
     values = {axis.name: value for axis, value in zip(axes, place, strict=True)}
     surroundings = {a.scalar.setting: values[a.name] for a in axes if not a.scalar.own}
-    fs = surroundings.get("fs", config.fs)
-    plain, derived = own_names(entry), {d.name: d for d in entry.derived}
+    fs = surroundings.get("fs", fs)
+    plain = {name: of for name, (of, _) in own_axes(entry).items()}
+    derived = {d.name: d for d in entry.derived}
     changed = {plain[n]: v for n, v in values.items() if n in plain and n not in derived}
     for name in values:
         if name in derived:
@@ -152,9 +151,8 @@ def _job(controller: str, entry: Entry, axes, place, config) -> tuple[Job, list[
         ]
     numbers = {k: v for k, v in changed.items() if entry.parameter(k).is_number}
     static = {p.name for p in entry.parameters if p.kind == "static"}
-    keys = {k: k if k not in surroundings else f"{entry.name}.{k}" for k in numbers}
-    settings = surroundings | {keys[k]: v for k, v in numbers.items()}
-    shaping = {k for k in surroundings if k not in LANE} | {keys[k] for k in static & set(numbers)}
+    settings = surroundings | {apart(entry, k): v for k, v in numbers.items()}
+    shaping = set(surroundings) - set(LANE) | {apart(entry, k) for k in static & set(numbers)}
     return Job(controller, tuple(sorted(settings.items())), frozenset(shaping)), problems
 
 
@@ -171,10 +169,11 @@ def _alike(axes: tuple[Axis, ...], entry: Entry, jobs: tuple[Job, ...]) -> list[
             same.setdefault((place[:at], place[at + 1 :], job), []).append(place[at])
         for (*_, job), values in same.items():
             if len(values) > 1:
-                rest = ", ".join(f"{k} = {v:g}" for k, v in job.settings if k != derived.of)
+                of = apart(entry, derived.of)
+                rest = ", ".join(f"{k} = {v:g}" for k, v in job.settings if k != of)
                 problems.append(
                     f"Axis `{axis.name}`: {' and '.join(f'{v:g}' for v in values)} all give "
-                    f"{derived.of} = {job.get(derived.of)}{f' with {rest}' if rest else ''}, a "
+                    f"{derived.of} = {job.get(of)}{f' with {rest}' if rest else ''}, a "
                     "duplicate cell."
                 )
     return problems
@@ -185,22 +184,17 @@ def job_config(job: Job, config: StudyConfig) -> StudyConfig:
 
     An axis changes its own scalar and what the controller says must follow, and nothing else.
     """
-    entry, own = entry_for(job.controller, config), settings_of(job.controller, config)
-    names = {p.name for p in entry.parameters}
-    changed = {}
-    for key, value in job.settings:
-        name = key.removeprefix(f"{entry.name}.")
-        if name in names and (key not in _STUDY or name != key):
-            changed[name] = value
+    entry = entry_for(job.controller, config)
+    own = settings_of(job.controller, entry, config)
+    given = dict(job.settings)
+    keys = {p.name: apart(entry, p.name) for p in entry.parameters}
+    changed = {name: given[key] for name, key in keys.items() if key in given}
     table = dict(config.controller.get(job.controller, {})) | changed
     table |= entry.followed(own, changed)
-    changes = {k: v for k, v in job.settings if k in _STUDY}
+    # The coupler's shape is no setting of a study.
+    changes = {k: v for k, v in given.items() if k in STUDY and k not in ("alpha", "p")}
     tables = dict(config.controller) | {job.controller: table}
     return replace(config, controllers=(job.controller,), controller=tables, **changes)
-
-
-#: Settings of ``StudyConfig`` that an axis can set.
-_STUDY = ("scale", "fs", "spread", "noise_power")
 
 
 def cell_numbers(grid: Grid, config: StudyConfig) -> dict[str, tuple[np.ndarray, str, str]]:
@@ -211,7 +205,8 @@ def cell_numbers(grid: Grid, config: StudyConfig) -> dict[str, tuple[np.ndarray,
     """
     found: dict[str, tuple[np.ndarray, str, str]] = {}
     for j, (controller, jobs) in enumerate(grid.jobs.items()):
-        entry, own = entry_for(controller, config), settings_of(controller, config)
+        entry = entry_for(controller, config)
+        own = settings_of(controller, entry, config)
         shown = [p for p in entry.parameters if p.is_number and p.unit == "samples"]
         for one in [*shown, *(d for d in entry.derived if d.of_cell is not None)]:
             name = f"cell_{one.name}"
@@ -219,7 +214,7 @@ def cell_numbers(grid: Grid, config: StudyConfig) -> dict[str, tuple[np.ndarray,
             values = found.setdefault(name, (blank, one.label, one.unit))[0]
             flat = values.reshape(-1, len(grid.jobs))
             for i, job in enumerate(jobs):
-                settings = own | {k: job.get(k, v) for k, v in own.items()}
+                settings = own | {k: job.get(apart(entry, k), v) for k, v in own.items()}
                 fs = job.get("fs", config.fs)
                 derived = getattr(one, "of_cell", None)
                 flat[i, j] = derived(settings, fs) if derived else settings[one.name]

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from martths_jax import InputError
+from martths_jax import Entry, InputError, Parameter, Passthrough
 from martths_jax.campaign.config import make_config
+from martths_jax.campaign.lanes import Worlds
+from martths_jax.control import registry
 from martths_jax.control.registry import find
 from martths_jax.sweep import make_sweep, run_sweep
 from martths_jax.sweep.axes import axis_values as values_of
@@ -144,3 +146,21 @@ def test_an_axis_changes_its_own_scalar_only():
 def test_every_scalar_sets_something_known():
     settings = {"nb", "no", "pull", "q", "scale", "fs", "spread", "noise_power", "alpha", "p"}
     assert {s.setting for s in scalars().values()} == settings
+
+
+def test_cells_keep_what_the_study_makes_the_force_from():
+    worlds = Worlds(make_config(force_from="measurement"), ())
+    assert worlds.benchmark(1024, None, None).force_from == "measurement"
+    assert worlds.benchmark(512, 40.0, None).force_from == "measurement"
+
+
+def test_a_parameter_called_like_an_axis_of_the_study_is_told_apart(monkeypatch):
+    own = Entry("mine", Passthrough, parameters=(Parameter("p", default=1.0, unit="samples"),))
+    monkeypatch.setattr(registry, "ENTRIES", (*registry.ENTRIES, own))
+    sweep = make_sweep({"mine.p": (2.0, 3.0), "p": (0.2,)}, controllers=("mine",))
+    first = sweep.grid.jobs["mine"][0]
+    assert first.get("p") == 0.2 and first.get("mine.p") == 2.0
+    assert job_config(first, sweep.study).controller["mine"] == {"p": 2.0}
+    assert cell_numbers(sweep.grid, sweep.study)["cell_p"][0].ravel().tolist() == [2.0, 3.0]
+    alone = make_sweep({"mine.p": (2.0, 3.0)}, controllers=("mine",)).grid.jobs["mine"][0]
+    assert alone.get("p") is None, "the coupler's arm does not move"
