@@ -22,29 +22,28 @@ from martths_jax import once, runtime, xla_flags
 OTHERS = "xla_cpu_small_while_loop_byte_threshold=30000"
 
 
-def loop(x):
+def loop(unique: float):
     """Some arithmetic in a loop over time."""
-    return jax.lax.scan(lambda c, _: (jnp.sin(c) * x + unique() * c, None), x, None, length=99)[0]
+    return lambda x: jax.lax.scan(
+        lambda c, _: (jnp.sin(c) * x + unique * c, None), x, None, length=99
+    )[0]
 
 
-def products(x):
+def products(unique: float):
     """A product of small matrices in it."""
-    m = jnp.full((8, 8), 0.1 * unique())
-    return jax.lax.scan(lambda c, _: (jnp.sin(m @ c) * x, None), x, None, length=99)[0]
+    m = jnp.full((8, 8), 0.1 * unique)
+    return lambda x: jax.lax.scan(lambda c, _: (jnp.sin(m @ c) * x, None), x, None, length=99)[0]
 
 
-def unique() -> float:
-    """A number that no other program has: one that comes from the cache leaves no files."""
-    return 0.5 + 1e-6 * random.random()
-
-
-def compiled(folder, columns: int, function=loop, **changed) -> tuple[str, str]:
+def compiled(folder, columns: int, make=loop, **changed) -> tuple[str, str]:
     """A compiled program, and its code for LLVM after optimisation.
+
+    The program is a new one at every call: one that comes from a cache leaves no files.
 
     Args:
         folder: for the compiler's own files.
         columns: its argument is (8, columns).
-        function: the program.
+        make: of the program, from a number that no other has.
         changed: options in place of the package's; None leaves one out.
     """
     options = runtime.compiler_options() | {"xla_backend_optimization_level": 3} | changed
@@ -52,10 +51,13 @@ def compiled(folder, columns: int, function=loop, **changed) -> tuple[str, str]:
     options |= {"xla_dump_to": str(folder), "xla_dump_emitter_re": ".*"}
     options = {k: v for k, v in options.items() if v is not None}
     x = jnp.ones((8, columns))
+    function = make(0.5 + 1e-6 * random.SystemRandom().random())
     text = jax.jit(function, compiler_options=options).lower(x).compile().as_text()
     # Metadata quote the program's own names.
     text = re.sub(r", metadata=\{.*?\}", "", text)
-    return text, "".join(p.read_text() for p in sorted(Path(folder).glob("*ir-with-opt.ll")))
+    code = "".join(p.read_text() for p in sorted(Path(folder).glob("*ir-with-opt.ll")))
+    assert code, "the compiler wrote no code for LLVM"
+    return text, code
 
 
 @pytest.fixture(scope="module")
