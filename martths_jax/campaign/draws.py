@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from martths_jax.campaign.files import writing
 from martths_jax.errors import InputError, argument_error
@@ -95,12 +95,14 @@ def even_draws(kind: str, trials: int, seed: int) -> np.ndarray:
             "trials", f"be at most {most} with {kind} draws, which are made all at once", trials,
             "Use independent draws.",
         )  # fmt: skip
+    from scipy.stats import qmc
+
     make = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[kind]
     with warnings.catch_warnings():
         # Sobol' balance wants a power of two; any number is allowed here and documented.
         warnings.simplefilter("ignore", UserWarning)
         cube = make(len(PARAMETERS), rng=np.random.default_rng(seed)).random(trials)
-    return norm.ppf(np.clip(cube, 2.0**-54, 1 - 2.0**-53))
+    return ndtri(np.clip(cube, 2.0**-54, 1 - 2.0**-53))
 
 
 def read_plants(path: Path, kind: str = "auto", spread: float = 1.0) -> np.ndarray:

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 #: Confidence of the intervals.
 LEVEL = 0.95
@@ -44,6 +43,8 @@ def percentile(sample: np.ndarray, percent: float, level: float = LEVEL) -> Esti
     if n == 0:
         return Estimate(np.nan, np.nan, np.nan, 0)
     rank = min(max(int(np.ceil(n * percent / 100)), 1), n)
+    from scipy import stats
+
     tails = stats.beta.ppf([(1 - level) / 2, (1 + level) / 2], rank, n + 1 - rank)
     low, high = x[np.minimum((n * tails).astype(int), n - 1)]
     return Estimate(float(np.percentile(x, percent)), float(low), float(high), n)
@@ -54,6 +55,8 @@ def proportion(successes: int, trials: int, level: float = LEVEL) -> Estimate:
     if trials == 0:
         return Estimate(np.nan, np.nan, np.nan, 0)
     share = successes / trials
+    from scipy import stats
+
     low, high = stats.binom.ppf([(1 - level) / 2, (1 + level) / 2], trials, share) / trials
     return Estimate(share, float(low), float(high), trials)
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.signal import lfilter
 
 from ..errors import argument_error
 from .checks import check_memory
@@ -47,6 +46,8 @@ class Oscillator:
         start = self.first[0 if quantity == "displacement" else 1]
         # Filter memory that makes the response at k = 0 zero and at k = 1 that of the step's map.
         memory = acceleration[0] * np.array([-weights[0], start - weights[1]])
+        from scipy.signal import lfilter
+
         return lfilter(weights, self.recursion, acceleration, zi=memory)[0]
 
 

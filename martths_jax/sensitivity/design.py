@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from martths_jax.campaign.memory import RESULT_BYTES
 from martths_jax.plant import PARAMETERS, Plants
@@ -56,7 +56,7 @@ class Design:
     def draws(self) -> np.ndarray:
         """(rows, 9) standard normal draws of the plants, by the inverse distribution function."""
         unit = self.unit.reshape(self.rows, -1)[:, : len(PARAMETERS)]
-        return norm.ppf(np.clip(unit, 2.0**-54, 1 - 2.0**-53))
+        return ndtri(np.clip(unit, 2.0**-54, 1 - 2.0**-53))
 
     def streams(self) -> np.ndarray:
         """(rows,) number of the trial whose noise a row sees."""
@@ -82,6 +82,8 @@ def saltelli(samples: int, dimensions: int, seed: int) -> np.ndarray:
         seed: of the scrambling.
     """
     rng = np.random.default_rng(seed)
+    from scipy.stats import qmc
+
     both = qmc.Sobol(2 * dimensions, scramble=True, rng=rng).random_base2(int(math.log2(samples)))
     A, B = both[:, :dimensions], both[:, dimensions:]
     unit = np.repeat(A[:, None], dimensions + 2, axis=1)

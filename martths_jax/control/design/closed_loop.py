@@ -7,11 +7,11 @@ compiled first; a design is checked here in milliseconds.  A test holds both tog
 from __future__ import annotations
 
 import numpy as np
-from scipy import signal
 
 from martths_jax.control.base import Observation
 from martths_jax.control.estimators.kalman import steady_state_gains
 from martths_jax.coupler import MM
+from martths_jax.structure.integrators.zoh import ZeroOrderHold
 from martths_jax.structure.modal import to_dense
 
 #: Rates up to so many times the benchmark's are tried for one that holds.
@@ -93,7 +93,7 @@ def lowest_stable_rate(benchmark, q: float, step) -> float | None:
     A, B, C = benchmark.plant_continuous
 
     def unstable(fs: float) -> bool:
-        discrete = signal.cont2discrete((A, B, C, np.zeros((2, 2))), 1 / fs, method="zoh")[:3]
+        discrete = ZeroOrderHold().discretise(A, B, C, 1 / fs)[:3]
         gain = steady_state_gains(*discrete, q, benchmark.noise_power * fs)[0]
         return tracking_radius(discrete, gain, step, 1 / fs) >= 1
 

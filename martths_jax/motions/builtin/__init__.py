@@ -17,8 +17,6 @@ from ...errors import argument_error
 from ..record import Record
 from .facts import Facts, measure, stored_facts, stored_seeds
 from .fit import Fit, fit_of
-from .matching import match
-from .start import random_start
 from .store import cached
 
 __all__ = [
@@ -50,6 +48,10 @@ ATTEMPTS = 12
 
 def generate(facts: Facts, seed: int | tuple[int, ...]) -> np.ndarray:
     """(n,) accelerogram [m/s^2] with the given facts; the same for the same seed."""
+    # Only who makes a motion waits for what that needs.
+    from .matching import match
+    from .start import random_start
+
     return np.round(match(random_start(facts, seed), facts), DECIMALS)
 
 
