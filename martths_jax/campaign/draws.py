@@ -89,20 +89,29 @@ def even_draws(kind: str, trials: int, seed: int) -> np.ndarray:
     Raises:
         InputError: more trials than there are points, or than fit into memory.
     """
+    # Half a second that only even draws have to wait for.
+    from scipy.stats import qmc
+
     most = int(min(available_memory() / EVEN_BYTES, MOST_SOBOL if kind == "sobol" else np.inf))
     if trials > most:
         raise argument_error(
             "trials", f"be at most {most} with {kind} draws, which are made all at once", trials,
             "Use independent draws.",
         )  # fmt: skip
-    from scipy.stats import qmc
-
     make = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[kind]
     with warnings.catch_warnings():
         # Sobol' balance wants a power of two; any number is allowed here and documented.
         warnings.simplefilter("ignore", UserWarning)
         cube = make(len(PARAMETERS), rng=np.random.default_rng(seed)).random(trials)
-    return ndtri(np.clip(cube, 2.0**-54, 1 - 2.0**-53))
+    return standard_normal(cube)
+
+
+def standard_normal(unit: np.ndarray) -> np.ndarray:
+    """Standard normal draws of points in [0, 1], by the inverse distribution function.
+
+    0 and 1, which would be infinite, count as the points nearest to them.
+    """
+    return ndtri(np.clip(unit, 2.0**-54, 1 - 2.0**-53))
 
 
 def read_plants(path: Path, kind: str = "auto", spread: float = 1.0) -> np.ndarray:

@@ -38,13 +38,14 @@ def percentile(sample: np.ndarray, percent: float, level: float = LEVEL) -> Esti
 
     The interval is that of the order statistic at the percentile's rank.
     """
+    # Half a second, at the end of a study and not at the start of every command.
+    from scipy import stats
+
     x = np.sort(sample[np.isfinite(sample)])
     n = x.size
     if n == 0:
         return Estimate(np.nan, np.nan, np.nan, 0)
     rank = min(max(int(np.ceil(n * percent / 100)), 1), n)
-    from scipy import stats
-
     tails = stats.beta.ppf([(1 - level) / 2, (1 + level) / 2], rank, n + 1 - rank)
     low, high = x[np.minimum((n * tails).astype(int), n - 1)]
     return Estimate(float(np.percentile(x, percent)), float(low), float(high), n)
@@ -52,11 +53,11 @@ def percentile(sample: np.ndarray, percent: float, level: float = LEVEL) -> Esti
 
 def proportion(successes: int, trials: int, level: float = LEVEL) -> Estimate:
     """A proportion with its bootstrap interval."""
+    from scipy import stats
+
     if trials == 0:
         return Estimate(np.nan, np.nan, np.nan, 0)
     share = successes / trials
-    from scipy import stats
-
     low, high = stats.binom.ppf([(1 - level) / 2, (1 + level) / 2], trials, share) / trials
     return Estimate(share, float(low), float(high), trials)
 

@@ -42,12 +42,13 @@ class Oscillator:
 
     def run(self, acceleration: np.ndarray, quantity: str = "displacement") -> np.ndarray:
         """(n,) displacement [m] or velocity [m/s] under (n,) ground acceleration, from rest."""
+        # A second that only who asks for a spectrum has to wait for.
+        from scipy.signal import lfilter
+
         weights = getattr(self, quantity)
         start = self.first[0 if quantity == "displacement" else 1]
         # Filter memory that makes the response at k = 0 zero and at k = 1 that of the step's map.
         memory = acceleration[0] * np.array([-weights[0], start - weights[1]])
-        from scipy.signal import lfilter
-
         return lfilter(weights, self.recursion, acceleration, zi=memory)[0]
 
 

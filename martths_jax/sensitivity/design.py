@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
+from martths_jax.campaign.draws import standard_normal
 from martths_jax.campaign.memory import RESULT_BYTES
 from martths_jax.plant import PARAMETERS, Plants
 from martths_jax.resources import available_memory
@@ -56,7 +56,7 @@ class Design:
     def draws(self) -> np.ndarray:
         """(rows, 9) standard normal draws of the plants, by the inverse distribution function."""
         unit = self.unit.reshape(self.rows, -1)[:, : len(PARAMETERS)]
-        return ndtri(np.clip(unit, 2.0**-54, 1 - 2.0**-53))
+        return standard_normal(unit)
 
     def streams(self) -> np.ndarray:
         """(rows,) number of the trial whose noise a row sees."""
@@ -81,9 +81,10 @@ def saltelli(samples: int, dimensions: int, seed: int) -> np.ndarray:
         dimensions: d.
         seed: of the scrambling.
     """
-    rng = np.random.default_rng(seed)
+    # Half a second that only those who make a design have to wait for.
     from scipy.stats import qmc
 
+    rng = np.random.default_rng(seed)
     both = qmc.Sobol(2 * dimensions, scramble=True, rng=rng).random_base2(int(math.log2(samples)))
     A, B = both[:, :dimensions], both[:, dimensions:]
     unit = np.repeat(A[:, None], dimensions + 2, axis=1)

@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import signal
+import subprocess
 import sys
 
 import numpy as np
@@ -158,3 +159,14 @@ def test_ctrl_c_twice_ends_at_once(monkeypatch):
         assert (first.value.code, ended) == (130, [130])
     finally:
         signal.signal(signal.SIGINT, handler)
+
+
+def test_the_commands_start_without_what_only_some_need():
+    """Each of these takes about half a second or more to import."""
+    code = (
+        "import sys, martths_jax, martths_jax.cli;"
+        "sys.exit(', '.join({'scipy.signal', 'scipy.stats', 'matplotlib', 'plotly'}"
+        " & set(sys.modules)) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

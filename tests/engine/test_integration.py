@@ -70,6 +70,15 @@ def test_methods_converge_to_the_exact_response_with_their_order(name):
     np.testing.assert_allclose(orders, expected, atol=0.15)
 
 
+def test_zero_order_hold_is_scipys():
+    A, B, C = first_order(build_reference())
+    ours = INTEGRATORS["zoh"].discretise(A, B, C, DT)
+    D = np.zeros((C.shape[0], B.shape[1]))
+    theirs = signal.cont2discrete((A, B, C, D), DT)[:4]
+    for found, expected in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=0)
+
+
 def test_rk4_and_zero_order_hold_agree():
     """With a held input the exact solution and RK4 differ by the fifth order of dt."""
     u = np.random.default_rng(1).standard_normal((600, 4)) * INPUT_SCALE

@@ -11,7 +11,7 @@ import numpy as np
 from martths_jax.control.base import Observation
 from martths_jax.control.estimators.kalman import steady_state_gains
 from martths_jax.coupler import MM
-from martths_jax.structure.integrators.zoh import ZeroOrderHold
+from martths_jax.structure.integrators import ZeroOrderHold
 from martths_jax.structure.modal import to_dense
 
 #: Rates up to so many times the benchmark's are tried for one that holds.

@@ -15,7 +15,7 @@ class ZeroOrderHold(Integrator):
     """
 
     def discretise(self, A, B, C, dt):
-        # scipy.signal has this as cont2discrete, to the bit, and takes a second to import.
+        # scipy.signal has this as cont2discrete and takes a second to import.
         n, m = B.shape
         both = np.vstack([np.hstack([A, B]), np.zeros((m, n + m))])
         upper = linalg.expm(dt * both)[:n]
