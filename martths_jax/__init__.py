@@ -20,7 +20,7 @@ from martths_jax.control.base import (
     Signal,
 )
 from martths_jax.control.compensator import Compensator
-from martths_jax.control.controllers import ADFC, LQG, Passthrough
+from martths_jax.control.controllers import ADFC, LQG, AdaptiveFeedforward, Passthrough
 from martths_jax.control.entry import Entry, Parameter
 from martths_jax.control.estimators import DirectMeasurement, KalmanFilter, design_kalman
 from martths_jax.coupler import Coupler, build_coupler
@@ -44,6 +44,7 @@ from martths_jax.watch import Status
 __all__ = [
     "ADFC",
     "LQG",
+    "AdaptiveFeedforward",
     "Benchmark",
     "Compensator",
     "Controller",

@@ -153,7 +153,7 @@ def build_benchmark(
         coupler=coupler or build_coupler(),
         plant_model=plant.discretise(dt),
         plant_continuous=continuous_plant(plant),
-        noise_power=SensorNoise().power,
+        noise_power=SensorNoise().noise_power,
         force_filter=own,
         force_from=force_from if own is None else "filter",
         integrator=integrator,
@@ -231,7 +231,7 @@ def continuous_plant(plant: Plants | None = None) -> tuple[np.ndarray, np.ndarra
     return A, B, C
 
 
-def command_volts(command_mm: jax.Array) -> jax.Array:
+def command_volts(u: jax.Array) -> jax.Array:
     """Valve commands [V] of (2, ...) commands [mm] (benchmark's sensor calibration)."""
-    shape = (2,) + (1,) * (command_mm.ndim - 1)
-    return command_mm * VOLT_PER_MM.reshape(shape) + VOLT_OFFSET.reshape(shape)
+    shape = (2,) + (1,) * (u.ndim - 1)
+    return u * VOLT_PER_MM.reshape(shape) + VOLT_OFFSET.reshape(shape)

@@ -100,7 +100,7 @@ def sample_period(
     target = frame_to_actuator(benchmark.coupler, numerical[:2])
 
     box, decision = compensator.decide_served(observed, target, delayed)
-    command = decision.command_mm
+    command = decision.u
 
     own = benchmark.force_filter
     after = LoopState(

@@ -23,23 +23,23 @@ class SensorNoise:
     which other trials run.
 
     Attributes:
-        power: power spectral density [mm^2 s]; the variance of a sample is power * fs.
+        noise_power: power spectral density [mm^2 s]; a sample's variance is noise_power * fs.
         shared: both sensors see the same sequence, as in the benchmark; False draws two.
         seed: seed of the study.
     """
 
-    power: float = 1.5e-7
+    noise_power: float = 1.5e-7
     shared: bool = True
     seed: int = 0
 
     def __post_init__(self):
         try:
-            good = 0 <= self.power < float("inf")
+            good = 0 <= self.noise_power < float("inf")
         except TypeError:
             good = False
         if not good:
             wanted = "be zero or positive and finite (mm^2 s)"
-            raise argument_error("power", wanted, repr(self.power))
+            raise argument_error("noise_power", wanted, repr(self.noise_power))
         check_seed(self.seed)
 
     @property
@@ -49,7 +49,7 @@ class SensorNoise:
 
     def variance(self, fs: float) -> float:
         """Variance of one sample [mm^2]."""
-        return self.power * fs
+        return self.noise_power * fs
 
     def draw(self, trial: jax.Array, samples: int, fs: float) -> jax.Array:
         """Noise of the given trials.

@@ -28,6 +28,26 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 SIBLING = Path(__file__).resolve().parents[2] / "shared" / "benchmark"
 
 
+def pytest_addoption(parser):
+    parser.addoption("--all", action="store_true", help="run the slow tests too, as CI does")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config, items):
+    leave_slow_out(config, items)
+
+
+def leave_slow_out(config, items) -> None:
+    """Leave the slow tests out, unless all are wanted or some are named; pytest counts them."""
+    named = any("::" in word for word in config.args) or config.option.markexpr
+    if config.option.all or os.environ.get("CI") or named:
+        return
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    if slow:
+        config.hook.pytest_deselected(items=slow)
+        items[:] = [item for item in items if item not in slow]
+
+
 @pytest.fixture(scope="session")
 def records() -> Path:
     """Folder of the real records, reference matrices and oracle signals."""

@@ -75,6 +75,7 @@ def as_users_run_it():
         yield
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("as_users_run_it")
 @pytest.mark.parametrize("page", WITH_CODE, ids=named)
 def test_python_runs(page, short, tmp_path, tmp_path_factory, monkeypatch, capsys):

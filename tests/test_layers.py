@@ -12,7 +12,7 @@ HOUSE = Path(martths_jax.__file__).parent
 FLOORS = (
     ("errors", "text", "screen", "once", "published", "_version", "xla_flags", "resources",
      "claims"),
-    ("files", "runtime"),
+    ("files", "runtime", "guests"),
     ("algebra", "structure"),
     ("motions",),
     ("coupler", "sensors", "transfer"),

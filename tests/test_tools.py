@@ -2,9 +2,11 @@
 
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from tests import conftest
 from tests.report import chromium
 from tests.tools import missing
 
@@ -60,3 +62,35 @@ def test_continuous_integration_says_what_it_cannot_install(machine):
     done, said = machine(MARTHS_CHROMIUM="/somewhere")
     assert done.returncode == 1 and said == []
     assert "need gcc libc6-dev (Debian's names)" in done.stderr
+
+
+class _Items:
+    """What ``pytest_collection_modifyitems`` asks of a configuration."""
+
+    def __init__(self, args=("tests",), everything=False, markexpr=""):
+        self.args = args
+        self.option = SimpleNamespace(all=everything, markexpr=markexpr)
+        self.left_out = []
+        self.hook = SimpleNamespace(pytest_deselected=lambda items: self.left_out.extend(items))
+
+
+@pytest.mark.parametrize(
+    ("config", "ci", "runs"),
+    [
+        (_Items(), "", ["quick"]),
+        (_Items(), "true", ["quick", "slow"]),
+        (_Items(everything=True), "", ["quick", "slow"]),
+        (_Items(args=("tests/test_a.py::slow",)), "", ["quick", "slow"]),
+        (_Items(markexpr="slow"), "", ["quick", "slow"]),
+    ],
+)
+def test_slow_tests_run_in_ci_and_when_asked_for(monkeypatch, config, ci, runs):
+    monkeypatch.setenv("CI", ci)
+    both = [
+        SimpleNamespace(name=name, get_closest_marker=lambda mark, n=name: n == mark)
+        for name in ("quick", "slow")
+    ]
+    items = list(both)
+    conftest.leave_slow_out(config, items)
+    assert [item.name for item in items] == runs
+    assert config.left_out == [item for item in both if item.name not in runs]

@@ -40,7 +40,7 @@ PEAKS = ("J3_1", "J3_2", "J6_4", "J6_28")
 CONDITIONS = {
     "as published": {},
     "independent sensor noise": {"shared": False},
-    "noise power x 10": {"power": 1.5e-6},
+    "noise power x 10": {"noise_power": 1.5e-6},
     "fs = 512 Hz": {"fs": 512},
     "fs = 2048 Hz": {"fs": 2048},
     "fs = 4096 Hz": {"fs": 4096},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,12 +34,19 @@ class Results:
         """Number of runs that diverged."""
         return int(np.sum(self.dataset.status.values >= Status.DIVERGED))
 
+    def write_csv(self, path: Path) -> None:
+        """Write the tidy table of this kind of campaign."""
+        raise NotImplementedError
+
+    def stored_signals(self) -> Iterable[xr.Dataset]:
+        """Signals that were kept, one dataset a motion and controller; none, if none were."""
+        return ()
+
 
 def write_results(
     run: RunFolder,
     name: str,
-    dataset: xr.Dataset,
-    write_csv: Callable[[xr.Dataset, Path], None],
+    done: Results,
     summary: Summary,
     remark: str = "",
 ) -> None:
@@ -48,12 +55,11 @@ def write_results(
     Args:
         run: a complete one.
         name: of its kind.
-        dataset: everything.
-        write_csv: writes the tidy table of a dataset.
+        done: everything.
         summary: to be read.
         remark: comment at the head of the configuration.
     """
-    save_dataset(dataset, run.path / f"{name}.nc")
-    write_csv(dataset, run.path / f"{name}.csv")
+    save_dataset(done.dataset, run.path / f"{name}.nc")
+    done.write_csv(run.path / f"{name}.csv")
     write_text(run.path / "summary.md", summary.markdown())
     write_config(run.header["config"], run.path / "config.toml", remark)

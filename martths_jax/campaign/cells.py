@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from martths_jax.campaign.engine import Engine, Outcome, choose_devices
-from martths_jax.campaign.memory import GB, choose_chunk, lane_bytes
+from martths_jax.campaign.memory import GB, choose_chunk, lane_bytes, running_bytes
 from martths_jax.campaign.plan import Plan
 from martths_jax.campaign.progress import Reporter, Tally
 from martths_jax.campaign.session import header
@@ -94,7 +94,10 @@ class Campaign(ABC):
         """Engine on as many devices as memory allows; says how much there is to run."""
         config, channels = self.plan.config, self.plan.noise.channels
         devices = choose_devices(config.devices)
-        count, lanes = choose_chunk(self.samples, channels, LANES, len(devices), config.memory_gb)
+        running = running_bytes(self.plan.indices, config.fs)
+        count, lanes = choose_chunk(
+            self.samples, channels, LANES, len(devices), config.memory_gb, running
+        )
         engine = self.engine_on(devices[:count], lanes)
         size = self.noise_lanes(engine) * lane_bytes(self.samples, channels) / GB
         where = counted(count, f"{devices[0].platform} device")

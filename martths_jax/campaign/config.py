@@ -59,7 +59,7 @@ class StudyConfig:
     integrator: str = "newmark"
     partition: str = "benchmark"
     force_from: str = "estimate"
-    noise_power: float = SensorNoise.power
+    noise_power: float = SensorNoise.noise_power
     noise_shared: bool = SensorNoise.shared
     out: str = "study"
     keep: tuple = ()

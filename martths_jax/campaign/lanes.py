@@ -103,11 +103,11 @@ class Worlds:
         self._benchmarks: dict[tuple, Benchmark] = {}
         self._grounds: dict[tuple, tuple] = {}
 
-    def benchmark(self, fs: float, alpha: float | None, p: float | None) -> Benchmark:
+    def benchmark(self, fs: float, alpha: float | None, arm: float | None) -> Benchmark:
         """The benchmark at a sampling rate [Hz] with a coupler of angle [degrees] and arm [m]."""
-        key = fs, alpha, p
+        key = fs, alpha, arm
         if key not in self._benchmarks:
-            shape = {"alpha_deg": alpha, "arm": p}
+            shape = {"alpha_deg": alpha, "arm": arm}
             coupler = build_coupler(**{k: v for k, v in shape.items() if v is not None})
             self._benchmarks[key] = study_benchmark(replace(self.config, fs=fs), coupler)
         return self._benchmarks[key]

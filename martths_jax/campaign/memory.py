@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import jax
+
 from martths_jax.errors import InputError
+from martths_jax.indices import Index, observers_of
 from martths_jax.resources import available_memory
 from martths_jax.simulation import room_for
 
@@ -21,6 +26,12 @@ ENOUGH = 0.5e9
 def lane_bytes(samples: int, channels: int) -> int:
     """Memory that one trial of a chunk takes [bytes]: its noise, the rest is small."""
     return 8 * room_for(samples) * channels * COPIES
+
+
+def running_bytes(indices: Sequence[Index], fs: float) -> int:
+    """Memory that a trial's indices take while its block runs [bytes]."""
+    state = jax.eval_shape(lambda: [one.init(1) for one in observers_of(indices, fs)])
+    return sum(8 * leaf.size for leaf in jax.tree.leaves(state))
 
 
 def check_results(trials: int, cells: int) -> None:
@@ -42,7 +53,12 @@ def check_results(trials: int, cells: int) -> None:
 
 
 def choose_chunk(
-    samples: int, channels: int, lanes: int, devices: int, memory_gb: float | None = None
+    samples: int,
+    channels: int,
+    lanes: int,
+    devices: int,
+    memory_gb: float | None = None,
+    running: int = 0,
 ) -> tuple[int, int]:
     """Devices to use and trials in a chunk, so that the chunk stays within a quarter of the free
     memory (or within `memory_gb`).
@@ -53,26 +69,28 @@ def choose_chunk(
         lanes: trials side by side on a device.
         devices: devices there are.
         memory_gb: bound set by the user [GB].
+        running: memory that a trial takes only while its block runs [bytes], one block a device.
 
     Raises:
         InputError: if not even one device's trials fit.
     """
     free = available_memory()
     bound = memory_gb * GB if memory_gb else min(free / 4, ENOUGH)
-    each = lane_bytes(samples, channels) * lanes
+    each, running = lane_bytes(samples, channels) * lanes, running * lanes
     # One block a device is the least there is; then it may take half of what is free.
-    affordable = int((bound if memory_gb else max(bound, free / 2)) // each)
+    affordable = int((bound if memory_gb else max(bound, free / 2)) // (each + running))
     if affordable < 1:
         given = (
             f"`memory_gb` (--memory) is {memory_gb:g} GB"
             if memory_gb
             else f"{free / GB:.2g} GB are free"
         )
+        need = (each + running) / GB
         raise InputError(
-            f"One chunk of {lanes} trials over {samples} samples takes {each / GB:.2g} GB, but "
+            f"One chunk of {lanes} trials over {samples} samples takes {need:.2g} GB, but "
             f"{given}; free some memory or shorten the motions."
         )
     devices = min(devices, affordable)
     block = lanes * devices
-    blocks = max(1, min(MOST_BLOCKS, int(bound // (each * devices))))
+    blocks = max(1, min(MOST_BLOCKS, int((bound / devices - running) // each)))
     return devices, block * blocks

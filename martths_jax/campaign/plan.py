@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -20,14 +19,12 @@ from martths_jax.control.registry import find, find_class, names
 from martths_jax.coupler import Coupler
 from martths_jax.errors import InputError, raise_all
 from martths_jax.files import name_problems
-from martths_jax.indices import Index, choose
+from martths_jax.guests import Copy
+from martths_jax.indices import Index, choose, files_of
 from martths_jax.motions import BUILTIN_NAMES, Motion, load_motion
 from martths_jax.motions.catalogue import BENCHMARK_NAMES, record_files
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import prepare
-
-#: Folder in a run's that keeps the files that controllers were loaded from.
-FILES = "controllers"
 
 
 @dataclass(frozen=True)
@@ -67,11 +64,16 @@ class Plan:
         for name, one in self.chosen.items():
             if one.table is not None:
                 found[name] = dict(one.table)
-                if one.file is not None:
-                    _, sign, inside = one.table["kind"].rpartition(":")
-                    inside = sign + inside if sign and not inside.endswith(".py") else ""
-                    found[name]["kind"] = f"{copy_name(one)}{inside}"
+                if one.copy is not None:
+                    found[name]["kind"] = one.copy.again(one.table["kind"])
         return found
+
+    @property
+    def copies(self) -> list[Copy]:
+        """Files of the user's that controllers and indices were loaded from."""
+        places = files_of(self.config.indices).values()
+        found = [*(one.copy for one in self.chosen.values()), *(place.copy for place in places)]
+        return [one for one in dict.fromkeys(found) if one is not None]
 
     @property
     def indices(self) -> tuple[Index, ...]:
@@ -146,11 +148,6 @@ def build_plan(config: StudyConfig) -> Plan:
     return Plan(config, benchmark, chosen, tuple(motions), noise, draws)
 
 
-def copy_name(one: Chosen) -> str:
-    """Where a run's folder keeps the file of a controller, relative to the folder."""
-    return f"{FILES}/{one.file.stem}-{one.identity['sha256'][:12]}.py"
-
-
 def given_name(given) -> str:
     """Name of a controller in the results."""
     return given.name if isinstance(given, Controller) else given
@@ -217,14 +214,14 @@ class Chosen:
         identity: what decides what it computes, as JSON can hold it.
         table: its settings with their ``kind``, from which it can be made again; None for an
             object, which cannot.
-        file: that its class was loaded from, if from one.
+        copy: how a run keeps the file that its class was loaded from, if from one.
     """
 
     controller: Controller
     entry: Entry
     identity: dict
     table: dict | None = None
-    file: Path | None = None
+    copy: Copy | None = None
 
     @property
     def name(self) -> str:
@@ -280,9 +277,9 @@ def build_controller(given, config: StudyConfig, benchmark: Benchmark) -> Chosen
     identity = {"kind": kind} | plain
     if kind != entry.name or entry not in ENTRIES:
         identity |= {"kind": entry.name, "code": code_of(made)}
-    if guest.sha256:
-        identity |= {"sha256": guest.sha256}
-    return Chosen(made, entry, identity, {"kind": kind} | plain, guest.file)
+    if guest.copy is not None:
+        identity |= {"sha256": guest.copy.sha256}
+    return Chosen(made, entry, identity, {"kind": kind} | plain, guest.copy)
 
 
 def motion_identity(motion: Motion) -> dict:

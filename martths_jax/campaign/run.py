@@ -52,7 +52,7 @@ def run_campaign(
         allow_mixed=allow_mixed, notice=reporter.notice,
     ) as run:  # fmt: skip
         run.keep_draws(campaign.plan.draws)
-        run.keep_controllers(campaign.plan.chosen.values())
+        run.keep_copies(campaign.plan.copies)
         engine = campaign.make_engine(reporter)
         devices = [str(d) for d in engine.devices]
         session = Session(run.path, run.owner, command_line, devices=devices, chunk=engine.chunk)

@@ -2,7 +2,7 @@
 
     run.json        what decides the numbers, the configuration, the number of trials
     plants.csv      the plants, where they are not independent draws
-    controllers/    copies of the files that controllers were loaded from
+    guests/         copies of the files that a user's controllers and indices were loaded from
     parts/C/M/      one file a chunk, controller C and motion M: 000000-000255.npz
     provenance.json when, where and how each session ran
     .martths/       who runs there now, and what is being written (``owner``, ``files``)
@@ -36,9 +36,9 @@ from martths_jax.campaign.header import FOLDER_FORMAT, read_header, sealed
 from martths_jax.campaign.machine import MIXED_NOTE
 from martths_jax.campaign.owner import Owner, door
 from martths_jax.campaign.parts import Damaged, read_part
-from martths_jax.campaign.plan import FILES, Chosen, copy_name
 from martths_jax.campaign.stored import Stored
 from martths_jax.errors import InputError
+from martths_jax.guests import FILES, Copy
 from martths_jax.text import counted
 
 #: Version of the layout of the result files.
@@ -233,15 +233,13 @@ class RunFolder(Stored):
             set_aside(file)
         write_plants(draws.plants(np.arange(1, draws.trials + 1)), file)
 
-    def keep_controllers(self, chosen: Iterable[Chosen]) -> None:
-        """Store the files that controllers were loaded from, so that they can be made again."""
-        for one in chosen:
-            if one.file is None:
-                continue
+    def keep_copies(self, copies: Iterable[Copy]) -> None:
+        """Store the files that a user's code was loaded from, so that it can be loaded again."""
+        for one in copies:
             content = one.file.read_bytes()
-            if hashlib.sha256(content).hexdigest() != one.identity["sha256"]:
+            if hashlib.sha256(content).hexdigest() != one.sha256:
                 raise InputError(f"{one.file} was changed while it ran; repeat the command.")
-            path = self.path / copy_name(one)
+            path = self.path / one.place
             if not (path.is_file() and path.read_bytes() == content):
                 with disk_errors(path):
                     path.parent.mkdir(exist_ok=True)

@@ -13,7 +13,7 @@ from rich.markup import escape
 from martths_jax import published
 from martths_jax.benchmark import Benchmark, build_benchmark
 from martths_jax.campaign import plan
-from martths_jax.campaign.export import save_mat
+from martths_jax.campaign.formats.mat import save_mat
 from martths_jax.cli.console import console, error_console, progress
 from martths_jax.cli.motion_options import (
     Dt,

@@ -47,8 +47,8 @@ _HELP = {
     "or path of a file (.mat, .npy, .AT2, .V2, .smc, .csv ...); repeated or with commas",
     "controllers": "A name such as lqg or adfc, package.module:Class or path/file.py:Class, also "
     "with settings: 'slow=adfc{nb=2048,no=2047}'; repeated or with commas",
-    "indices": f"What is evaluated: {', '.join(GROUPS)}, names such as J2_1 or TI, or package."
-    "module:NAME of your own; repeated or with commas",
+    "indices": f"What is evaluated: {', '.join(GROUPS)}, names such as J2_1 or TI, "
+    "package.module:NAME or path/file.py:NAME; repeated or with commas",
     "out": "Where the results go",
     "plants": "CSV file of the nine parameters of each plant",
     "signals": "Signals of chosen trials too",

@@ -43,7 +43,7 @@ def sweep(
         "--axis",
         metavar="NAME=VALUES",
         callback=None,  # the commas are between the values
-        help="Any axis: lambda=1e-8:1e-4:log9, scale=0.1:1:lin5, q=1e-6,1e-5; also noise_power, "
+        help="Any axis: pull=1e-8:1e-4:log9, scale=0.1:1:lin5, q=1e-6,1e-5; also noise_power, "
         "fs, alpha, p, spread; may be repeated",
     ) = None,
     config: Config = None,

@@ -31,9 +31,9 @@ class Observation:
     Attributes:
         k: number of the sample, a scalar.
         dt: sample period [s].
-        target_mm: (2, T) strokes x_a(k) that the numerical substructure asks for.
-        measured_mm: (2, T) strokes x_m(k) as the sensors give them.
-        estimate_mm: (2, T) strokes x_hat(k) after the estimator's correction.
+        x_a: (2, T) strokes x_a(k) that the numerical substructure asks for.
+        x_m: (2, T) strokes x_m(k) as the sensors give them.
+        x_hat: (2, T) strokes x_hat(k) after the estimator's correction.
         state: what the estimator knows at k: of the Kalman filter (2, m, T), z_hat(k) slot by slot.
         delayed: what comes out of the controller's delay line at k: the record of n samples ago,
             zeros before that; None without one.
@@ -41,9 +41,9 @@ class Observation:
 
     k: jax.Array
     dt: jax.Array
-    target_mm: jax.Array
-    measured_mm: jax.Array
-    estimate_mm: jax.Array
+    x_a: jax.Array
+    x_m: jax.Array
+    x_hat: jax.Array
     state: Any
     delayed: Any
 
@@ -54,12 +54,12 @@ class Decision:
     """What the controller does at sample k.
 
     Attributes:
-        command_mm: (2, T) commands u(k), held until k + 1.
+        u: (2, T) commands u(k), held until k + 1.
         record: pytree of (..., T) arrays that goes into the delay line, or None without one.
         signals: named (..., T) arrays that ``simulate(..., keep=True)`` should store.
     """
 
-    command_mm: jax.Array
+    u: jax.Array
     record: Any = None
     signals: dict[str, jax.Array] = field(default_factory=dict)
 
@@ -118,24 +118,24 @@ class Estimator(ABC):
         """The prediction for k = 0, a pytree with the trials on the last axis."""
 
     @abstractmethod
-    def correct(self, predicted: Any, measured_mm: jax.Array) -> tuple[Any, jax.Array]:
+    def correct(self, predicted: Any, x_m: jax.Array) -> tuple[Any, jax.Array]:
         """At k, with the measurement of k.
 
         Args:
             predicted: prediction for k, made at k - 1.
-            measured_mm: (2, T) strokes x_m(k).
+            x_m: (2, T) strokes x_m(k).
 
         Returns:
             what is known at k, of any structure; (2, T) estimated strokes x_hat(k) [mm].
         """
 
     @abstractmethod
-    def predict(self, state: Any, command_mm: jax.Array) -> Any:
+    def predict(self, state: Any, u: jax.Array) -> Any:
         """The prediction for k + 1.
 
         Args:
             state: what is known at k, from ``correct``.
-            command_mm: (2, T) commands u(k).
+            u: (2, T) commands u(k).
 
         Returns:
             a prediction of the same structure, shapes and types as that of ``init``.

@@ -22,6 +22,8 @@ from martths_jax.signals import SIGNALS
 #: Number of trials to trace with: that of a block, so that JAX need not trace the stages of a
 #: sample again for it; or the next one that no array of the controller ends in.
 PROBE = 64
+#: Former names of what a controller sees and gives -> what they are called now.
+RENAMED = {"target_mm": "x_a", "measured_mm": "x_m", "estimate_mm": "x_hat", "command_mm": "u"}
 #: Signals that the loop itself gives: one of these names would replace what the indices see.
 RESERVED = tuple(signal.name for signal in SIGNALS)
 #: Controllers that were found good: key of ``_key`` -> which leaves hold one value a trial.
@@ -206,14 +208,14 @@ class _Look:
         if not isinstance(decision, Decision):
             self.refuse("return a Decision from `step`", type(decision).__name__)
         self.same(state, after, "state", "init", "step")
-        self.shaped(decision.command_mm, "command")
+        self.shaped(decision.u, "command")
         self.check_record(line, decision.record)
         self.check_signals(controller, decision.signals)
         if line and line.renew:
             renewed = self.call("renew of its delay line", line.renew, after)
             self.same(state, renewed, "state", "init", "renew of its delay line")
         after = self.call(
-            "predict of its estimator", estimator.predict, corrected, decision.command_mm
+            "predict of its estimator", estimator.predict, corrected, decision.u
         )
         self.same(predicted, after, "estimator's state", "init", "predict")
 
@@ -229,9 +231,12 @@ class _Look:
             raise
         except Exception as error:  # the user's code may raise anything
             reason = (str(error).splitlines() or [""])[0]
+            former = [name for name in RENAMED if name in reason]
+            hint = "".join(f"  `{name}` is called `{RENAMED[name]}` now." for name in former)
             raise InputError(
                 f"Controller {self.kind}: {what} ends in {type(error).__name__} ({reason}) when it "
                 f"is traced with {self.trials} trials, which stand on the last axis of every array."
+                + hint
             ) from error
 
     def pair(self, found, method: str, what: str) -> tuple:

@@ -43,13 +43,13 @@ class Observed:
     Attributes:
         state: as before the sample.
         corrected: what the estimator knows at k.
-        measured_mm, estimate_mm: (2, T) x_m(k) and x_hat(k).
+        x_m, x_hat: (2, T) x_m(k) and x_hat(k).
     """
 
     state: CompensatorState
     corrected: Any
-    measured_mm: jax.Array
-    estimate_mm: jax.Array
+    x_m: jax.Array
+    x_hat: jax.Array
 
 
 @jax.tree_util.register_dataclass
@@ -96,56 +96,54 @@ class Compensator:
         states = self.estimator.init(trials), self.controller.init(trials)
         return CompensatorState(jnp.zeros((), int), *states, None)
 
-    def observe(
-        self, state: CompensatorState, measured_mm: jax.Array
-    ) -> tuple[Observed, jax.Array]:
+    def observe(self, state: CompensatorState, x_m: jax.Array) -> tuple[Observed, jax.Array]:
         """First half of sample k.
 
         Args:
             state: at the start of k.
-            measured_mm: (2, T) strokes x_m(k).
+            x_m: (2, T) strokes x_m(k).
 
         Returns:
             the box between its halves; (2, T) estimated strokes x_hat(k) [mm].
         """
-        corrected, estimate = self.estimator.correct(state.predicted, measured_mm)
-        return Observed(state, corrected, measured_mm, estimate), estimate
+        corrected, estimate = self.estimator.correct(state.predicted, x_m)
+        return Observed(state, corrected, x_m, estimate), estimate
 
     def decide(
-        self, observed: Observed, target_mm: jax.Array
+        self, observed: Observed, x_a: jax.Array
     ) -> tuple[CompensatorState, jax.Array, dict[str, jax.Array]]:
         """Second half of sample k.
 
         Args:
             observed: from ``observe``.
-            target_mm: (2, T) strokes x_a(k).
+            x_a: (2, T) strokes x_a(k).
 
         Returns:
             state at the start of k + 1; (2, T) commands u(k) [mm]; the controller's signals.
         """
         k, rows = observed.state.k, observed.state.line
-        line = self.controller.delay_line(target_mm.shape[-1])
+        line = self.controller.delay_line(x_a.shape[-1])
         if line is None:
-            state, decision = self.decide_served(observed, target_mm, None)
-            return state, decision.command_mm, decision.signals
+            state, decision = self.decide_served(observed, x_a, None)
+            return state, decision.u, decision.signals
         row = k % line.samples
         out = jax.tree.map(lambda x: x[row], rows)
-        state, decision = self.decide_served(observed, target_mm, out)
+        state, decision = self.decide_served(observed, x_a, out)
         rows = jax.tree.map(lambda x, new: x.at[row].set(new), rows, decision.record)
         controller = state.controller
         if line.renew is not None:
             full = row == line.samples - 1
             controller = jax.lax.cond(full, line.renew, lambda x: x, controller)
         state = replace(state, controller=controller, line=rows)
-        return state, decision.command_mm, decision.signals
+        return state, decision.u, decision.signals
 
     def decide_served(
-        self, observed: Observed, target_mm: jax.Array, delayed: Any
+        self, observed: Observed, x_a: jax.Array, delayed: Any
     ) -> tuple[CompensatorState, Decision]:
         """``decide`` for a caller that serves the delay line itself.
 
         Args:
-            observed, target_mm: as for ``decide``.
+            observed, x_a: as for ``decide``.
             delayed: what comes out of the line at k.
 
         Returns:
@@ -154,25 +152,25 @@ class Compensator:
         """
         before = observed.state
         seen = Observation(
-            before.k, self.dt, target_mm, observed.measured_mm, observed.estimate_mm,
+            before.k, self.dt, x_a, observed.x_m, observed.x_hat,
             observed.corrected, delayed,
         )  # fmt: skip
         controller, decision = self.controller.step(before.controller, seen)
-        decision = replace(decision, command_mm=computed(decision.command_mm))
-        predicted = self.estimator.predict(observed.corrected, decision.command_mm)
+        decision = replace(decision, u=computed(decision.u))
+        predicted = self.estimator.predict(observed.corrected, decision.u)
         return CompensatorState(before.k + 1, predicted, controller, before.line), decision
 
     def step(
-        self, state: CompensatorState, target_mm: jax.Array, measured_mm: jax.Array
+        self, state: CompensatorState, x_a: jax.Array, x_m: jax.Array
     ) -> tuple[CompensatorState, jax.Array, dict[str, jax.Array]]:
         """Both halves of a sample, on signals that are there: recorded ones, or a rig's.
 
         Args:
             state: at the start of k.
-            target_mm, measured_mm: (2, T) strokes x_a(k) and x_m(k).
+            x_a, x_m: (2, T) strokes x_a(k) and x_m(k).
 
         Returns:
             as ``decide``.
         """
-        observed, _ = self.observe(state, measured_mm)
-        return self.decide(observed, target_mm)
+        observed, _ = self.observe(state, x_m)
+        return self.decide(observed, x_a)

@@ -38,7 +38,6 @@ class Parameter:
         choices: the words it may be, if it is a word.
         kind: one of ``KINDS``; `tunable` numbers can be axes of a sweep too, `static` ones if they
             are one number.
-        axis: its name as an axis of sweeps, if that is another.
     """
 
     name: str
@@ -53,7 +52,6 @@ class Parameter:
     size: int = 0
     choices: tuple[str, ...] = ()
     kind: str = "lane"
-    axis: str = ""
 
     @property
     def title(self) -> str:

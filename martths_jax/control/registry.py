@@ -13,20 +13,16 @@ fields (``entry.entry_of``).
 from __future__ import annotations
 
 import difflib
-import hashlib
-import importlib
 import importlib.metadata
-import importlib.util
 import sys
-import traceback
 from dataclasses import dataclass
-from pathlib import Path
 from types import ModuleType
 
 from martths_jax.control.base import Controller
 from martths_jax.control.controllers import ENTRIES
 from martths_jax.control.entry import Entry, entry_of
 from martths_jax.errors import InputError
+from martths_jax.guests import Copy, is_place, last_line, load
 
 GROUP = "martths.controllers"
 #: What can be named, to complete "give ...".
@@ -39,12 +35,11 @@ class Guest:
 
     Attributes:
         entry: of the controller.
-        file: that was loaded; sha256: of its content.  None and "" for what was imported.
+        copy: how a run keeps the file; None for what was imported.
     """
 
     entry: Entry
-    file: Path | None = None
-    sha256: str = ""
+    copy: Copy | None = None
 
 
 def names() -> list[str]:
@@ -59,22 +54,10 @@ def find(text: str) -> Guest:
     Raises:
         InputError: there is none such; or its file or package cannot be loaded.
     """
-    place, _, name = text.rpartition(":")
-    if _is_file(text):
-        place, name = text, ""
-    elif not place or (len(place) == 1 and _is_file(name)):  # C:\... is a drive, no module
+    if not is_place(text):
         return _named(text)
-    if _is_file(place):
-        path = Path(place)
-        module, digest = _load_file(path)
-        return Guest(_entry_in(module, name, text), path, digest)
-    try:
-        module = importlib.import_module(place)
-    except Exception as error:  # code of the user's may raise anything
-        raise InputError(
-            f"Controller {text!r} cannot be imported: {_last_line(error)}.  Give {WAYS}."
-        ) from error
-    return Guest(_entry_in(module, name, text))
+    place = load(text, "Controller", WAYS)
+    return Guest(_entry_in(place.module, place.name, text), place.copy)
 
 
 def find_class(kind: type[Controller]) -> Entry:
@@ -94,7 +77,7 @@ def _named(text: str) -> Guest:
             except Exception as error:  # another package's code may raise anything
                 raise InputError(
                     f"Controller {text!r}, an entry point of {point.dist.name}, cannot be loaded: "
-                    f"{_last_line(error)}."
+                    f"{last_line(error)}."
                 ) from error
             return Guest(_as_entry(given, f"entry point {text!r}"))
     near = difflib.get_close_matches(text, names(), n=3)
@@ -107,41 +90,6 @@ def _named(text: str) -> Guest:
 
 def _points():
     return importlib.metadata.entry_points(group=GROUP)
-
-
-def _is_file(text: str) -> bool:
-    return text.endswith(".py")
-
-
-def _load_file(path: Path) -> tuple[ModuleType, str]:
-    """The module of a file, loaded once for each content, and the SHA-256 of that."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"Controller file {path} cannot be read ({error.strerror or error})."
-        ) from None
-    digest = hashlib.sha256(content).hexdigest()
-    # The same content has the same name wherever it lies, since code is identified by it.
-    name = f"martths_guest_{digest[:12]}"
-    known = sys.modules.get(name)
-    if known is not None and Path(known.__file__ or "") == path.resolve():
-        return known, digest
-    spec = importlib.util.spec_from_file_location(name, path.resolve())
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up while they are made
-    # What the file imports from its own folder is found, as if it were run.
-    sys.path.insert(0, str(path.resolve().parent))
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:  # code of the user's may raise anything
-        del sys.modules[name]
-        raise InputError(
-            f"Controller file {path} cannot be loaded: {_last_line(error)}{_line_of(error, path)}."
-        ) from error
-    finally:
-        sys.path.remove(str(path.resolve().parent))
-    return module, digest
 
 
 def _entry_in(module: ModuleType, name: str, text: str) -> Entry:
@@ -197,16 +145,3 @@ def _speaking_for(module: ModuleType | None, kind: type) -> Entry | None:
 def _is_own_class(thing, module: ModuleType) -> bool:
     own = isinstance(thing, type) and issubclass(thing, Controller)
     return own and thing.__module__ == module.__name__
-
-
-def _last_line(error: Exception) -> str:
-    return traceback.format_exception_only(error)[-1].strip().rstrip(".")
-
-
-def _line_of(error: Exception, path: Path) -> str:
-    """Where in a file an error came from, in words."""
-    if isinstance(error, SyntaxError) and error.filename == str(path.resolve()):
-        return f" (line {error.lineno})"
-    frames = traceback.extract_tb(error.__traceback__)
-    lines = [f.lineno for f in frames if f.filename == str(path.resolve())]
-    return f" (line {lines[-1]})" if lines else ""

@@ -31,7 +31,7 @@ from martths_jax.indices.sums import (
     observers_of,
     without_value,
 )
-from martths_jax.indices.table import DEFAULT, GROUPS, KNOWN, choose
+from martths_jax.indices.table import DEFAULT, GROUPS, KNOWN, choose, files_of
 from martths_jax.indices.tracking import TrackingIndicator
 
 #: The benchmark's delays, and its pairs: name of the RMS index, name of the peak index.
@@ -64,6 +64,7 @@ __all__ = [
     "TrackingIndicator",
     "choose",
     "correlate",
+    "files_of",
     "final_indices",
     "indices",
     "indices_of",

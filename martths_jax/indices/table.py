@@ -3,7 +3,9 @@
     J2_1                      one of them
     J2, FEIamp                all places of one
     benchmark, true, ...      a group of the table, see ``GROUPS``
-    package.module:NAME       an ``Index``, or several, of one's own that can be imported
+    package.module:NAME       an ``Index``, or a tuple of them, of one's own that can be imported
+    path/file.py:NAME         the same out of a file, whose code is run to load it
+    path/file.py              all that stand in a file by themselves
 
 From Python an ``Index`` may stand there itself.
 """
@@ -11,11 +13,10 @@ From Python an ``Index`` may stand there itself.
 from __future__ import annotations
 
 import difflib
-import importlib
-import traceback
 from collections.abc import Iterable, Iterator, Sequence
 
 from martths_jax.errors import InputError
+from martths_jax.guests import Place, is_place, load
 from martths_jax.indices import benchmark, frequency, tracking, true_stroke
 from martths_jax.indices.base import Index
 
@@ -27,6 +28,8 @@ GROUPS = {
     "frequency": frequency.INDICES,
 }
 KNOWN = {index.name: index for group in GROUPS.values() for index in group}
+#: What of one's own can be named, to complete "Give ...".
+WAYS = "package.module:NAME or path/file.py:NAME"
 #: What runs if nothing is said.
 DEFAULT = ("benchmark",)
 
@@ -62,6 +65,13 @@ def choose(given: Iterable[str | Index] | str | Index = DEFAULT) -> tuple[Index,
     if problems:
         raise InputError("\n".join(problems))
     return tuple(found.values())
+
+
+def files_of(given: Iterable[str | Index]) -> dict[str, Place]:
+    """Those of some names that stand for a file, and what lies there."""
+    texts = [one for one in given if isinstance(one, str) and is_place(one)]
+    places = {text: load(text, "Index", WAYS) for text in texts}
+    return {text: place for text, place in places.items() if place.file is not None}
 
 
 def units_in_words(indices: Iterable[Index]) -> str:
@@ -101,26 +111,30 @@ def _meant(one) -> Iterator[Index]:
     named = [i for i in KNOWN.values() if word in (i.name.casefold(), i.group.casefold())]
     if named:
         return iter(named)
-    if ":" in one:
-        return _imported(one)
+    if is_place(one):
+        return _loaded(one)
     names = list(dict.fromkeys([*GROUPS, *(i.group for i in KNOWN.values()), *KNOWN]))
     near = difflib.get_close_matches(one, names, n=3, cutoff=0.5)
     hint = f"the nearest are {', '.join(near)}" if near else f"groups are {', '.join(GROUPS)}"
     raise InputError(
-        f"Index {one!r} is unknown; {hint}.  One of your own is package.module:NAME, or an Index "
-        "object in Python."
+        f"Index {one!r} is unknown; {hint}.  One of your own is {WAYS}, or an Index object in "
+        "Python."
     )
 
 
-def _imported(text: str) -> Iterator[Index]:
-    place, _, name = text.partition(":")
-    try:
-        given = getattr(importlib.import_module(place), name)
-    except Exception as error:  # code of the user's may raise anything
-        last = traceback.format_exception_only(error)[-1].strip().rstrip(".")
-        raise InputError(
-            f"Index {text!r} cannot be imported: {last}.  Give package.module:NAME."
-        ) from error
+def _loaded(text: str) -> Iterator[Index]:
+    place = load(text, "Index", WAYS)
+    if not place.name:
+        given = tuple(x for x in vars(place.module).values() if isinstance(x, Index))
+        if not given:
+            raise InputError(f"File {text} holds no Index; define one, or name a tuple of them.")
+    elif not hasattr(place.module, place.name):
+        known = [n for n, x in vars(place.module).items() if isinstance(x, Index)]
+        near = difflib.get_close_matches(place.name, known, n=1) or known
+        hint = f"did you mean {near[0]!r}?" if near else "it defines no index."
+        raise InputError(f"Index {text!r} names {place.name!r}, which is not there; {hint}")
+    else:
+        given = getattr(place.module, place.name)
     several = (given,) if isinstance(given, Index) else given
     if not isinstance(several, tuple) or not all(isinstance(i, Index) for i in several):
         raise InputError(

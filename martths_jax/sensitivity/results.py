@@ -42,6 +42,19 @@ class Sensitivity(Results):
     on.
     """
 
+    def write_csv(self, path: Path) -> None:
+        """One row a controller, index and factor; empty where the index does not vary."""
+        names = [self.dataset[d].values.tolist() for d in ("controller", "index", "factor")]
+        numbers = np.stack([self.dataset[name].values for name in ESTIMATES], axis=-1).tolist()
+        notes = self.dataset.note.values.tolist()
+        rows = (
+            [controller, name, factor, *numbers[c][i][j], notes[c][i]]
+            for c, controller in enumerate(names[0])
+            for i, name in enumerate(names[1])
+            for j, factor in enumerate(names[2])
+        )
+        write_rows(path, ["controller", "index", "factor", *ESTIMATES, "note"], rows)
+
     @property
     def notes(self) -> dict[tuple[str, str], str]:
         """Sentence about each (controller, index) whose Sobol' indices mean little."""
@@ -98,7 +111,7 @@ def write_results(run: RunFolder, design: Design, plan: Plan) -> Sensitivity:
     """``sensitivity.nc``, ``sensitivity.csv``, ``summary.md`` and the configuration."""
     done = Sensitivity(assemble(run, design, plan), run.path)
     remark = "An analysis: `martths sensitivity --config FILE`; `trials` are its base samples."
-    write_files(run, "sensitivity", done.dataset, write_csv, done.summary(), remark)
+    write_files(run, "sensitivity", done, done.summary(), remark)
     return done
 
 
@@ -153,20 +166,6 @@ def indices_of(sensitivity: Sensitivity, controller: str) -> SobolIndices:
     order = ("first", "total", "first_low", "first_high", "total_low", "total_high")
     columns = [cell[name].values for name in order]
     return SobolIndices(*columns, cell["mean"].values, cell.deviation.values, int(cell.used))
-
-
-def write_csv(dataset: xr.Dataset, path: Path) -> None:
-    """One row a controller, index and factor; empty where the index does not vary."""
-    names = [dataset[d].values.tolist() for d in ("controller", "index", "factor")]
-    numbers = np.stack([dataset[name].values for name in ESTIMATES], axis=-1).tolist()
-    notes = dataset.note.values.tolist()
-    rows = (
-        [controller, name, factor, *numbers[c][i][j], notes[c][i]]
-        for c, controller in enumerate(names[0])
-        for i, name in enumerate(names[1])
-        for j, factor in enumerate(names[2])
-    )
-    write_rows(path, ["controller", "index", "factor", *ESTIMATES, "note"], rows)
 
 
 def summarise(found: Sensitivity) -> Summary:

@@ -11,11 +11,12 @@ from martths_jax.campaign import provenance
 from martths_jax.campaign.config import make_config
 from martths_jax.campaign.files import write_text, writing
 from martths_jax.campaign.machine import MIXED_NOTE
-from martths_jax.campaign.plan import FILES, build_plan
+from martths_jax.campaign.plan import build_plan
 from martths_jax.campaign.progress import Reporter
 from martths_jax.campaign.session import read_provenance
 from martths_jax.campaign.store import PLANTS, RunFolder
 from martths_jax.errors import InputError, raise_all
+from martths_jax.guests import FILES, kept
 from martths_jax.study.results import Study
 from martths_jax.study.runner import MonteCarlo, finish
 
@@ -59,21 +60,22 @@ def merge_runs(
     if len(machines) > 1 and not allow_mixed:
         raise InputError(_mixed(machines))
     head = first.header | {"machines": machines}
-    with RunFolder.start(out, head, allow_mixed=allow_mixed, notice=reporter.notice) as run:
+    said: list[str] = []
+
+    def notice(text: str) -> None:
+        said.append(text)
+        reporter.notice(text)
+
+    with RunFolder.start(out, head, allow_mixed=allow_mixed, notice=notice) as run:
         for share in shares:
             if share.path.resolve() != out.resolve():
                 _copy(share, run, reporter)
         raise_all(run.missing(), f"{out} is not complete")
         engine = engine_again(run, records, keep, reporter) if signals else None
-        if len(machines) > 1:
+        if len(machines) > 1 and not any(MIXED_NOTE in text for text in said):
             mixed = f"Results of {len(machines)} kinds of machines are mixed."
             reporter.notice(f"{mixed}  {MIXED_NOTE}")
         return finish(run, engine, reporter)
-
-
-def _placed(kind: str, folder: Path) -> str:
-    """The kind of a controller, which may name a copy in a run's folder."""
-    return f"{folder / kind}" if kind.startswith(f"{FILES}/") else kind
 
 
 def _mixed(machines: dict) -> str:
@@ -94,6 +96,8 @@ def _copy(share: RunFolder, run: RunFolder, reporter: Reporter) -> None:
                 with writing(target) as temporary:
                     shutil.copyfile(path, temporary)
     run.keep_draws(share.draws())
+    if (share.path / FILES).is_dir():
+        shutil.copytree(share.path / FILES, run.path / FILES, dirs_exist_ok=True)
     sessions = read_provenance(run.path)["sessions"]
     sessions += [s for s in read_provenance(share.path)["sessions"] if s not in sessions]
     write_text(run.path / "provenance.json", json.dumps({"sessions": sessions}, indent=1))
@@ -105,9 +109,10 @@ def engine_again(run: RunFolder, records: str | None, keep, reporter: Reporter):
     if records is not None:
         settings["records"] = records
     settings["controller"] = {
-        name: table | {"kind": _placed(table.get("kind", name), run.path)}
+        name: table | {"kind": kept(table.get("kind", name), run.path)}
         for name, table in settings["controller"].items()
     }
+    settings["indices"] = tuple(kept(text, run.path) for text in settings["indices"])
     for table in settings["controller"].values():
         if table["kind"].startswith(str(run.path)):
             reporter.notice(f"Loading runs the code of {table['kind'].rpartition('.py')[0]}.py.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import xarray as xr
 
 from martths_jax.campaign.assembly import Results
 from martths_jax.campaign.dataset import read_dataset, read_results
+from martths_jax.campaign.tidy import write_runs
 from martths_jax.errors import InputError
 from martths_jax.study.signals import group
 from martths_jax.study.summary import Summary, summarise
@@ -31,6 +33,23 @@ class Study(Results):
             (str(status.controller.values[i]), str(status.motion.values[j]), int(k))
             for i, j, k in np.argwhere(status.values >= Status.DIVERGED)
         ]
+
+    def write_csv(self, path: Path) -> None:
+        """One row a controller, motion and trial: status, indices, peak volts.
+
+        Numbers have all their digits; an index of a trial that diverged is empty.
+        """
+        write_runs(self.dataset, path, after=["volt_peak"])
+
+    def stored_signals(self) -> Iterator[xr.Dataset]:
+        """Signals of each motion and controller with what all share on it."""
+        if not (self.folder / "signals.nc").is_file():
+            return
+        for motion in self.dataset.motion.values:
+            shared = self.signals(str(motion))
+            for controller in self.dataset.controller.values:
+                own = self.signals(str(motion), str(controller))
+                yield own.merge(shared).assign_attrs(motion=str(motion), controller=str(controller))
 
     def signals(self, motion: str, controller: str | None = None) -> xr.Dataset:
         """Stored signals of a controller on a motion; without one, what all share there.

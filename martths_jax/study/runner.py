@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
 from martths_jax.campaign.assembly import write_results as write_files
 from martths_jax.campaign.cells import Batch, Block, Campaign, Cell
@@ -15,7 +14,6 @@ from martths_jax.campaign.config import StudyConfig, make_config
 from martths_jax.campaign.dataset import assemble
 from martths_jax.campaign.distributed import Meeting
 from martths_jax.campaign.engine import Engine
-from martths_jax.campaign.export import write_csv
 from martths_jax.campaign.memory import check_results
 from martths_jax.campaign.plan import build_plan
 from martths_jax.campaign.progress import Reporter
@@ -25,7 +23,6 @@ from martths_jax.errors import InputError
 from martths_jax.runtime import check_runtime
 from martths_jax.study.results import Study
 from martths_jax.study.signals import store_signals
-from martths_jax.study.summary import summarise
 from martths_jax.text import counted
 
 
@@ -128,16 +125,17 @@ def _waiting(left: dict[Cell, np.ndarray]) -> np.ndarray:
 
 def finish(run: RunFolder, engine: Engine | None, reporter: Reporter) -> Study:
     """Write the result files of a complete run; without an engine, no signals."""
-    dataset = write_results(run)
+    done = write_results(run)
     if engine is not None and engine.plan.config.signals:
         reporter.notice("Running the chosen trials again for their signals.")
         keep = engine.plan.config.keep
-        store_signals(engine, dataset, run.path / "signals.nc", keep, run.digest)
-    return Study(dataset, run.path)
+        store_signals(engine, done.dataset, run.path / "signals.nc", keep, run.digest)
+    return done
 
 
-def write_results(run: RunFolder) -> xr.Dataset:
+def write_results(run: RunFolder) -> Study:
     """``study.nc``, the tidy CSV, the summary and the effective configuration."""
     dataset = assemble(run, run.draws().plants(np.arange(run.trials + 1)))
-    write_files(run, "study", dataset, write_csv, summarise(dataset))
-    return dataset
+    done = Study(dataset, run.path)
+    write_files(run, "study", done, done.summary())
+    return done

@@ -1,6 +1,6 @@
 """The axes of a sweep: which scalars there are, and how a user writes their values.
 
-lambda=1e-8:1e-4:log9    nine values from 1e-8 to 1e-4, evenly spaced in the logarithm
+pull=1e-8:1e-4:log9      nine values from 1e-8 to 1e-4, evenly spaced in the logarithm
 scale=0.1:1:lin5         five values from 0.1 to 1, evenly spaced
 q=1e-6,1e-5              these values
 """
@@ -57,7 +57,7 @@ STUDY = {
     "fs": Scalar("fs", is_positive, "be positive", "Hz", "sampling rate"),
     "alpha": Scalar("alpha", lambda v: is_number(v) and 0 < v < 90, "lie between 0 and 90 degrees",
                     "degree", "angle alpha of the coupler"),
-    "p": Scalar("p", is_positive, "be positive", "m", "arm p of the coupler"),
+    "arm": Scalar("arm", is_positive, "be positive", "m", "arm p of the coupler"),
     "spread": Scalar("spread", _at_least(0), "be zero or positive", "1",
                      "spread of the plant's parameters"),
 }  # fmt: skip
@@ -82,7 +82,7 @@ def scalars(entries: Iterable[Entry] = ENTRIES) -> dict[str, Scalar]:
 def own_axes(entry: Entry) -> dict[str, tuple[str, Parameter]]:
     """Axes of an entry -> the parameter that each sets, and what its values are."""
     plain = {
-        apart(entry, p.axis or p.name): (p.name, p) for p in entry.parameters if p.is_number
+        apart(entry, p.name): (p.name, p) for p in entry.parameters if p.is_number
     }
     return plain | {d.name: (d.of, d.as_parameter) for d in entry.derived}
 
@@ -100,6 +100,9 @@ def ways(entries: Iterable[Entry]) -> dict[str, tuple[str, ...]]:
             found.setdefault(derived.of, {derived.of: None})[derived.name] = None
     return {of: tuple(names) for of, names in found.items()}
 
+
+#: Former names of axes -> what settings, options and results call the same thing.
+RENAMED = {"lambda": "pull", "p": "arm"}
 
 _RANGE = re.compile(r"([^:]+):([^:]+):(lin|log)(\d+)")
 
@@ -131,7 +134,7 @@ def split_axis(text: str) -> tuple[str, str]:
     """
     name, sign, values = text.partition("=")
     if not sign:
-        raise InputError(f"Axis {text!r} must read NAME=VALUES, such as lambda=1e-8:1e-4:log9.")
+        raise InputError(f"Axis {text!r} must read NAME=VALUES, such as pull=1e-8:1e-4:log9.")
     return name, values
 
 
@@ -153,7 +156,7 @@ def make_axes(
     for item in items:
         try:
             raw, values = split_axis(item) if isinstance(item, str) else item
-            name = canonical(raw, known, [*ENTRIES, *entries])
+            name = canonical(raw, known)
             if any(axis.name == name for axis in axes):
                 raise InputError(f"Axis `{name}` is given twice; give its values once.")
             axes.append(Axis(name, axis_values(name, values, known[name]), known[name]))
@@ -170,24 +173,23 @@ def make_axes(
     return tuple(axes), problems
 
 
-def canonical(name: str, known: Mapping[str, Scalar], entries: Iterable[Entry] = ()) -> str:
+def canonical(name: str, known: Mapping[str, Scalar]) -> str:
     """Name of an axis among the known ones.
 
     Args:
-        name: as a user writes it; a parameter may be called as in settings or as on axes.
+        name: as a user writes it.
         known: from ``scalars``.
-        entries: of the controllers that run.
 
     Raises:
-        InputError: with the nearest names, if there is none such.
+        InputError: with the nearest names, or with the new name of an axis that has one.
     """
     plain = str(name).strip().lower().replace("-", "_")
-    aliases = {p.name: p.axis for entry in entries for p in entry.parameters if p.axis}
-    plain = aliases.get(plain, plain)
     exact = str(name).strip()
     if exact in known:
         return exact
     if plain not in known:
+        if plain in RENAMED:
+            raise InputError(f"Axis {name!r} is called `{RENAMED[plain]}` now; write that.")
         near = difflib.get_close_matches(plain, list(known), n=3)
         hint = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(known)}"
         raise InputError(f"Axis {name!r} is unknown; {hint}.")

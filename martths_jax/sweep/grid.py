@@ -192,7 +192,7 @@ def job_config(job: Job, config: StudyConfig) -> StudyConfig:
     table = dict(config.controller.get(job.controller, {})) | changed
     table |= entry.followed(own, changed)
     # The coupler's shape is no setting of a study.
-    changes = {k: v for k, v in given.items() if k in STUDY and k not in ("alpha", "p")}
+    changes = {k: v for k, v in given.items() if k in STUDY and k not in ("alpha", "arm")}
     tables = dict(config.controller) | {job.controller: table}
     return replace(config, controllers=(job.controller,), controller=tables, **changes)
 

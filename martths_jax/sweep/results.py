@@ -34,6 +34,13 @@ from martths_jax.watch import Status
 class Sweep(Results):
     """Results of a sweep, ``sweep.nc``: ``value`` (axes ..., controller, motion, trial, index)."""
 
+    def write_csv(self, path: Path) -> None:
+        """One row a cell, controller, motion and trial: axes, status, counts, indices.
+
+        Numbers have all their digits; an index of a trial that diverged is empty.
+        """
+        write_runs(self.dataset, path, before=list(json.loads(self.dataset.attrs["counts"])))
+
     @property
     def axes(self) -> tuple[Axis, ...]:
         """The axes of the grid."""
@@ -100,7 +107,7 @@ def write_results(run: RunFolder, config: SweepConfig) -> Sweep:
         "The study that a sweep repeats: `martths sweep --config FILE --axis NAME=VALUES ...`\n"
         f"with these axes: {axes}"
     )
-    write_files(run, "sweep", done.dataset, write_csv, done.summary(config.shown), remark)
+    write_files(run, "sweep", done, done.summary(config.shown), remark)
     return done
 
 
@@ -156,14 +163,6 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         "counts": json.dumps(list(identity["counts"])),
     }
     return xr.Dataset(variables, coordinates, about)
-
-
-def write_csv(dataset: xr.Dataset, path: Path) -> None:
-    """One row a cell, controller, motion and trial: axes, status, counts, indices.
-
-    Numbers have all their digits; an index of a trial that diverged is empty.
-    """
-    write_runs(dataset, path, before=list(json.loads(dataset.attrs["counts"])))
 
 
 def summarise(sweep: Sweep, shown: tuple[str, ...]) -> Summary:

@@ -46,7 +46,7 @@ def run_sweep(
     """Run a grid of studies, or what is missing of it, and write its results.
 
     Args:
-        axes: names to values, as in ``{"nb": [128, 256], "lambda": "1e-8:1e-4:log9"}``, or texts
+        axes: names to values, as in ``{"nb": [128, 256], "pull": "1e-8:1e-4:log9"}``, or texts
             ``NAME=VALUES``; see ``axes.SCALARS`` for the names.
         config: the study that is repeated: a ``StudyConfig``, settings by name, or a TOML file.
         shown: indices of the figures and the summary.
@@ -157,7 +157,7 @@ class CellsBeside(Batch):
         """Common surroundings of the cells, with their controllers one a cell."""
         worlds, job = self.campaign.worlds, self.jobs[0]
         fs, scale = job.get("fs", worlds.config.fs), job.get("scale")
-        benchmark = worlds.benchmark(fs, job.get("alpha"), job.get("p"))
+        benchmark = worlds.benchmark(fs, job.get("alpha"), job.get("arm"))
         controllers = [self.campaign.ready[job] for job in self.jobs]
         prepared, own = prepare(controllers, benchmark, len(self.jobs))
         ground = worlds.ground(benchmark, fs, scale, self.motion)
@@ -209,7 +209,7 @@ def build(sweep: SweepConfig) -> tuple[Plan, Worlds, dict[Job, object]]:
 
 
 def _place(job: Job, config: StudyConfig) -> tuple:
-    return config.fs, job.get("alpha"), job.get("p")
+    return config.fs, job.get("alpha"), job.get("arm")
 
 
 def _draws(draws: Draws, spread: float | None) -> Draws:

@@ -214,7 +214,7 @@ def _code(options: Options) -> dict | None:
     kind = controller.entry.controller
     if kind.__module__.partition(".")[0] == martths_jax.__name__:
         return None
-    return code_of(kind) | {"file": controller.guest.sha256}
+    return code_of(kind) | {"file": controller.guest.copy.sha256 if controller.guest.copy else ""}
 
 
 def _load_or_begin(path: Path, options: Options, setting: dict, notice) -> dict:

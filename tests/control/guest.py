@@ -36,9 +36,9 @@ class Lead(Controller):
 
     def step(self, state, seen):
         before, v = state
-        v = v + self.corner * seen.dt * ((seen.target_mm - before) / seen.dt - v)
-        command = self.gain * (seen.target_mm + self.lead * v)
-        return (seen.target_mm, v), Decision(command_mm=command, signals={"v": v})
+        v = v + self.corner * seen.dt * ((seen.x_a - before) / seen.dt - v)
+        command = self.gain * (seen.x_a + self.lead * v)
+        return (seen.x_a, v), Decision(u=command, signals={"v": v})
 
 
 ENTRY = Entry(

@@ -22,11 +22,11 @@ class Smoothing(Estimator):
     def init(self, trials):
         return jnp.zeros((2, trials))
 
-    def correct(self, predicted, measured_mm):
-        estimate = predicted + self.share * (measured_mm - predicted)
+    def correct(self, predicted, x_m):
+        estimate = predicted + self.share * (x_m - predicted)
         return estimate, estimate
 
-    def predict(self, state, command_mm):
+    def predict(self, state, u):
         return state
 
 
@@ -35,7 +35,7 @@ class Smoothing(Estimator):
 class Forgetful(Smoothing):
     """One that changes the shape of what it predicts."""
 
-    def predict(self, state, command_mm):
+    def predict(self, state, u):
         return state[0]
 
 

@@ -87,7 +87,7 @@ class LeastMean(Fit):
 
 def test_pieces_of_ones_own_run(benchmark, short):
     """One trial by the engine's loop; each trial its own number; halving rate and share alike."""
-    plants, quiet = nominal_plant()[[0, 0]], SensorNoise(power=0.0)
+    plants, quiet = nominal_plant()[[0, 0]], SensorNoise(noise_power=0.0)
 
     def run(rate, share):
         own = AdaptiveFeedforward(

@@ -15,6 +15,7 @@ from martths_jax.cli import app
 from martths_jax.study import open_study
 from martths_jax.sweep import open_sweep
 
+pytestmark = pytest.mark.slow
 GUEST = Path(__file__).with_name("guest.py")
 ROOT = Path(__file__).resolve().parents[2]
 #: A process that is stopped for good after its second part.

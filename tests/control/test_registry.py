@@ -29,7 +29,8 @@ def test_all_ways_find_the_same(tmp_path, monkeypatch):
     assert by_module.name == "lead" and find("tests.control.guest:ENTRY").entry is by_module
     for text in (f"{GUEST}", f"{GUEST}:Lead", f"{GUEST}:ENTRY"):
         guest = find(text)
-        assert guest.entry.name == "lead" and guest.file == GUEST and len(guest.sha256) == 64
+        assert guest.entry.name == "lead"
+        assert guest.copy.file == GUEST and len(guest.copy.sha256) == 64
 
     class Point:
         name, dist = "theirs", type("Dist", (), {"name": "package"})
@@ -73,7 +74,7 @@ def test_a_class_without_an_entry_speaks_by_its_fields():
             return ()
 
         def step(self, state, seen):
-            return state, Decision(self.gain * seen.target_mm)
+            return state, Decision(self.gain * seen.x_a)
 
     entry = entry_of(Plain)
     assert entry.name == "plain" and entry.defaults == {"gain": 2.0, "mode": "a"}
@@ -149,7 +150,7 @@ def test_a_file_is_loaded_once_for_each_content(tmp_path):
         first, again = find(str(path)), find(f"{path}:Lead")
         assert first.entry is again.entry and builtins.loads == 1
         path.write_text(path.read_text() + "# more\n")
-        assert find(str(path)).sha256 != first.sha256 and builtins.loads == 2
+        assert find(str(path)).copy.sha256 != first.copy.sha256 and builtins.loads == 2
         assert str(tmp_path) not in sys.path
     finally:
         del builtins.loads

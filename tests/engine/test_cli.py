@@ -125,6 +125,7 @@ def test_an_interrupted_write_leaves_what_was_there(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.slow
 def test_comparison_with_table_4(benchmark):
     found = compare_with_table4(benchmark, [burst()])
     rows = found.rows()

@@ -154,4 +154,4 @@ def test_text_is_no_draw():
     with pytest.raises(InputError, match="`draws` must be numbers, but got 'abc'"):
         plant_from_draws("abc")
     with pytest.raises(InputError, match="`power` must be zero or positive and finite"):
-        SensorNoise(power="loud")
+        SensorNoise(noise_power="loud")

@@ -85,6 +85,7 @@ def test_signals_meet_the_oracle(oracle, benchmark, motion):
         assert np.all(error < 1e-4), error
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("optimised")
 def test_indices_of_the_whole_record_meet_the_oracle(oracle, benchmark, motion, records):
     """All 24 of 51 s.

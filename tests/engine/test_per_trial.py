@@ -51,6 +51,7 @@ def lqg_pair(benchmark, trials):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pair", [adfc_pair, lqg_pair])
 def test_every_documented_array_over_the_trials(benchmark, monkeypatch, pair):
     """More trials than a device's block holds, so that the last block is hardly filled."""

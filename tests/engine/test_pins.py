@@ -23,6 +23,7 @@ def same():
     return check
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("optimised")
 @pytest.mark.parametrize("motion", RECORDS)
 def test_indices_on_the_records_are_the_pinned_ones(motion, benchmark, records, same):

@@ -31,7 +31,7 @@ from martths_jax.indices import (
 from martths_jax.study import run_study
 from tests.engine.motions import burst
 
-MOTION, QUIET = burst(0.4), SensorNoise(power=0.0)
+MOTION, QUIET = burst(0.4), SensorNoise(noise_power=0.0)
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,7 @@ from martths_jax.control.estimators import DirectMeasurement
 from martths_jax.indices import NAMES, PAIRS
 from tests.engine.motions import burst
 
-QUIET = SensorNoise(power=0.0)
+QUIET = SensorNoise(noise_power=0.0)
 
 
 def test_indices_are_those_of_the_kept_signals(benchmark):
@@ -131,7 +131,7 @@ def test_shared_and_given_noise(benchmark):
 
 
 def test_noise_has_its_power_and_does_not_depend_on_length():
-    model = SensorNoise(power=1.5e-7, seed=3)
+    model = SensorNoise(noise_power=1.5e-7, seed=3)
     long = np.asarray(model.draw(jnp.arange(20), 5000, 1024.0))
     np.testing.assert_array_equal(long[:700], model.draw(jnp.arange(20), 700, 1024.0))
     assert long.shape == (5000, 1, 20)
@@ -140,6 +140,7 @@ def test_noise_has_its_power_and_does_not_depend_on_length():
     assert abs(np.corrcoef(pair[:, 0, 0], pair[:, 1, 0])[0, 1]) < 0.05
 
 
+@pytest.mark.slow
 def test_gradients_with_respect_to_controller_gains(benchmark):
     motion, plants = burst(0.3), draw_plants(2, 1)
     start = LQG.design(benchmark)
@@ -158,6 +159,7 @@ def test_gradients_with_respect_to_controller_gains(benchmark):
     assert np.all(np.abs(gradient[:, 0]) > 1e-3)
 
 
+@pytest.mark.slow
 def test_gradient_with_respect_to_the_pull(benchmark):
     motion, plants = burst(0.3), nominal_plant()
 
@@ -283,8 +285,8 @@ class LeadCompensator(martths_jax.Controller):
         return jnp.zeros((2, trials))
 
     def step(self, state, seen):
-        rate = (seen.target_mm - state) / seen.dt
-        return seen.target_mm, Decision(command_mm=seen.target_mm + self.lead * rate)
+        rate = (seen.x_a - state) / seen.dt
+        return seen.x_a, Decision(u=seen.x_a + self.lead * rate)
 
 
 def test_a_controller_of_ones_own(benchmark):

@@ -153,6 +153,7 @@ def test_pieces_divide_a_window():
     assert loop.piece_length(2 * 641) == 2 * 641  # pieces of two samples would cost more
 
 
+@pytest.mark.slow
 def test_pieces_of_a_window_change_only_round_off(benchmark, monkeypatch):
     """Three pieces a window, and whole windows, with delays found across their ends."""
     plants, controller = draw_plants(3, 4), ADFC(nb=192, no=191)

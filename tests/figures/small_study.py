@@ -45,7 +45,7 @@ def build(parent: Path) -> Path:
     trials = np.arange(TRIALS + 1)
     for i, (controller, motion) in enumerate(run.cells):
         run.write(controller, motion, trials, outcome(i))
-    dataset = write_results(run)
+    dataset = write_results(run).dataset
     run.close()
     path = run.path / "signals.nc"
     write_dataset(xr.Dataset(attrs={"format": FORMAT, "label": "-"}), path)

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+import typer
 from scipy.io import loadmat
 from typer.testing import CliRunner
 
 from martths_jax import InputError
+from martths_jax.campaign.formats import FORMATS, Format
 from martths_jax.cli import app
+from martths_jax.cli.export import command
 from martths_jax.study import open_study
 from tests.figures.small_study import MOTIONS
 
@@ -44,8 +47,28 @@ def test_signals_may_be_left_out(study_folder, tmp_path):
 
 
 def test_a_matlab_file_beyond_its_format_is_refused(study_folder, tmp_path, monkeypatch):
-    monkeypatch.setattr("martths_jax.campaign.export.MOST_BYTES", 100_000)
+    monkeypatch.setattr("martths_jax.campaign.formats.mat.MOST_BYTES", 100_000)
     done = export(study_folder, "--mat", tmp_path / "a.mat")
     assert isinstance(done.exception, InputError) and not list(tmp_path.iterdir())
     with pytest.raises(InputError, match="Variable `signals` is too large"):
         raise done.exception
+
+
+def test_a_format_is_one_definition_and_an_option_of_its_own(study_folder, tmp_path):
+    """A guest's format reads the same results as ours, and the command says so in its help."""
+
+    def write(done, path, signals):
+        kept = len(list(done.stored_signals())) if signals else 0
+        path.write_text(f"{done.dataset.sizes['trial']} trials, {kept} signals")
+
+    own = typer.Typer()
+    own.command()(command([*FORMATS, Format("words", "A sentence about the study", write)]))
+    file = tmp_path / "words.txt"
+    for more, kept in (([], 2 * len(MOTIONS)), (["--no-signals"], 0)):
+        done = CliRunner().invoke(own, [str(study_folder), "--words", str(file), *more])
+        assert done.exit_code == 0, done.output
+        trials = open_study(study_folder).dataset.sizes["trial"]
+        assert file.read_text() == f"{trials} trials, {kept} signals"
+    assert "A sentence about the study" in CliRunner().invoke(own, ["--help"]).output
+    refused = CliRunner().invoke(own, [str(study_folder)])
+    assert "--csv FILE, --plants FILE or --words FILE" in str(refused.exception)

@@ -33,7 +33,7 @@ def own(fields=(), registered=True, estimator=DirectMeasurement(), **methods):
     """An instance of a good controller with some of its methods and fields replaced."""
     good = {
         "init": lambda self, trials: jnp.zeros((2, trials)),
-        "step": lambda self, state, seen: (seen.target_mm, Decision(seen.target_mm)),
+        "step": lambda self, state, seen: (seen.x_a, Decision(seen.x_a)),
     }
     whole = [("estimator", object, estimator), *fields]
     kind = make_dataclass("Own", whole, bases=(Controller,), frozen=True, namespace=good | methods)
@@ -42,7 +42,7 @@ def own(fields=(), registered=True, estimator=DirectMeasurement(), **methods):
 
 def deciding(make):
     """A controller whose step decides what `make` makes of the target."""
-    return own(step=lambda self, state, seen: (state, make(seen.target_mm)))
+    return own(step=lambda self, state, seen: (state, make(seen.x_a)))
 
 
 def line(samples=8, renew=None):
@@ -74,7 +74,7 @@ WRONG = {
     ),
     "no Decision": (lambda: deciding(lambda x: x), "return a Decision from `step`"),
     "no state": (
-        lambda: own(step=lambda self, state, seen: Decision(seen.target_mm)),
+        lambda: own(step=lambda self, state, seen: Decision(seen.x_a)),
         "return a tuple of state and Decision from step",
     ),
     "record without a line": (
@@ -82,7 +82,7 @@ WRONG = {
     ),
     "record of another shape": (
         lambda: own(delay_line=line(), step=lambda self, state, seen: (
-            state, Decision(seen.target_mm, record=seen.target_mm[0]))),
+            state, Decision(seen.x_a, record=seen.x_a[0]))),
         r"shape of its record, but got \(2, trials\) from its delay line and \(trials,\) from step",
     ),
     "line and no record": (lambda: own(delay_line=line()), "keep the structure of its record"),
@@ -102,18 +102,18 @@ WRONG = {
         "keep the type of its state, but got int64 from init and float64 from step",
     ),
     "state of another structure": (
-        lambda: own(step=lambda self, state, seen: ((state, state), Decision(seen.target_mm))),
+        lambda: own(step=lambda self, state, seen: ((state, state), Decision(seen.x_a))),
         "keep the structure of its state",
     ),
     "renewal that changes the state": (
         lambda: own(delay_line=line(renew=lambda state: state[0]),
                     step=lambda self, state, seen: (
-                        state, Decision(seen.target_mm, record=seen.target_mm))),
+                        state, Decision(seen.x_a, record=seen.x_a))),
         "shape of its state, .* from renew of its delay line",
     ),
     "signal with other axes than declared": (
         lambda: own(signals=(Signal("a", ("actuator", "tap")),), step=lambda self, state, seen: (
-            state, Decision(seen.target_mm, signals={"a": seen.target_mm}))),
+            state, Decision(seen.x_a, signals={"a": seen.x_a}))),
         r"signal `a` the axes that it declares, \(actuator, tap, trials\), but got \(2, trials\)",
     ),
     "signal under a name of the loop": (
@@ -128,8 +128,15 @@ WRONG = {
     ),
     "step that asks for a value": (
         lambda: own(step=lambda self, state, seen: (
-            state, Decision(seen.target_mm if seen.k > 3 else state))),
+            state, Decision(seen.x_a if seen.k > 3 else state))),
         "step ends in TracerBoolConversionError",
+    ),
+    "a former name of what it sees": (
+        lambda: own(step=lambda self, state, seen: (state, Decision(seen.target_mm))),
+        "step ends in AttributeError .*`target_mm` is called `x_a` now",
+    ),
+    "a former name of what it gives": (
+        lambda: deciding(lambda x: Decision(command_mm=x)), "`command_mm` is called `u` now",
     ),
     "line of half a sample": (lambda: own(delay_line=line(1.5)), "line of a whole number of sam"),
 }  # fmt: skip
@@ -179,7 +186,7 @@ class Gain(Controller):
         return jnp.zeros((2, trials))
 
     def step(self, state, seen):
-        return state, Decision(self.taps.sum() * self.gain * seen.target_mm)
+        return state, Decision(self.taps.sum() * self.gain * seen.x_a)
 
 
 def marked(controller, trials) -> list[bool]:

@@ -47,15 +47,17 @@ class Hold(Controller):
         return ()
 
     def step(self, state, seen):
-        return state, Decision(command_mm=jnp.full_like(seen.target_mm, self.command))
+        return state, Decision(u=jnp.full_like(seen.x_a, self.command))
 
 
+@pytest.mark.slow
 def test_the_valves_limit_is_watched_and_not_applied(benchmark):
     """Twice the command, beyond the limit, is twice the stroke."""
     strokes, motion = {}, burst(0.3)
+    quiet = SensorNoise(noise_power=0.0)
     for command in (20.0, 40.0):
         result = simulate(
-            benchmark, Hold(command), nominal_plant(), motion, SensorNoise(power=0.0), keep=True
+            benchmark, Hold(command), nominal_plant(), motion, quiet, keep=True
         )
         strokes[command] = result.signals["x_m"]
         beyond = Status.SATURATED if command > 30 else Status.OK

@@ -73,7 +73,7 @@ def test_literal_loses_trials_that_the_default_keeps(benchmark, late):
 def test_a_singular_fit_keeps_the_last_good_coefficients(benchmark):
     """Without motion and noise the normal matrix is zero: each fit is held, and counted."""
     still = Motion("still", np.zeros(300), 1024.0)
-    quiet = SensorNoise(power=0.0)
+    quiet = SensorNoise(noise_power=0.0)
     start = np.zeros((8, 2))
     start[0, 0] = start[4, 1] = 0.9
     literal = ADFC(nb=NB, no=NB - 4, pull=0.0, start=start)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -42,6 +43,7 @@ def controllers(draw) -> ADFC:
     return ADFC(nb=nb, no=draw(st.integers(0, nb - 1)), pull=pull, towards="inverse")
 
 
+@pytest.mark.slow
 @PROPERTY
 @given(draws=draws, motion=motions(), controller=controllers(), seed=st.integers(0, 99))
 def test_any_run_ends_with_a_status_and_numbers_that_belong_to_it(
@@ -89,7 +91,7 @@ def test_scaling_the_units_scales_the_run(benchmark, draws, motion, exponent, se
             ADFC(nb=100, no=99, pull=3e-11 * s**2, towards="inverse", q=3e-11 * s**2),
             plants,
             replace(small, acceleration=s * small.acceleration),
-            SensorNoise(power=power * s**2, seed=seed),
+            SensorNoise(noise_power=power * s**2, seed=seed),
         )
 
     one, other = run(1.0), run(s)

@@ -146,6 +146,7 @@ def test_a_fork_after_the_first_run_is_told_to_spawn():
     assert '"spawn"' in done.stdout and "ended" in done.stdout
 
 
+@pytest.mark.slow
 def test_surroundings_that_cannot_be_used_end_the_command_in_a_sentence(tmp_path):
     command = "from martths_jax.cli import main; main()"
     done = python("-c", command, "modes", MARTHS_DEVICES="two")

@@ -28,7 +28,7 @@ from martths_jax.stability import (
 )
 
 IMPULSE = Motion("impulse", np.eye(1, 3000)[0] * 1e-2, 1024.0)
-QUIET = SensorNoise(power=0.0)
+QUIET = SensorNoise(noise_power=0.0)
 
 
 def inverse(benchmark, **options):

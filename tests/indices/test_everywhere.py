@@ -8,28 +8,34 @@ import pytest
 import scipy.io
 
 from martths_jax import ADFC, InputError, build_benchmark
-from martths_jax.campaign.export import study_signals, write_mat
+from martths_jax.campaign.formats.mat import write_mat
 from martths_jax.campaign.parts import part_bytes, read_part
 from martths_jax.figures import drawings, figure_list
 from martths_jax.figures.source import open_source
 from martths_jax.figures.style import index_label
+from martths_jax.guests import FILES
 from martths_jax.nominal import compare_with_table4
+from martths_jax.report import replay
 from martths_jax.report.payload import history_payload, kept_signals, trial_payload
 from martths_jax.report.tables import render
 from martths_jax.study import merge_runs, open_study, run_study
 from martths_jax.sweep import run_sweep
+from tests.indices import guest
 from tests.indices.guest import BOTH, MEAN
 from tests.study.places import short_motion, small
 from tests.study.test_storage import Says
 
-GIVEN = ("benchmark", "true", "TI", "frequency", "tests.indices.guest:BOTH")
+GIVEN = ("benchmark", "true", "TI", "frequency")
 #: Name -> unit, of some that are in no paper.
 UNITS = {"J2true_1": "%", "TI_2": "mm²", "FEIdelay_1": "ms", "mean_1": "mm"}
 
 
 def settings(folder, **changes):
+    """The guest's file lies beside the folder, as a user's would."""
+    own = shutil.copyfile(guest.__file__, folder.parent / "own.py")
     controllers = ("lqg", "adfc{nb=64,no=63}")
-    return small(folder, trials=3, controllers=controllers, indices=GIVEN) | changes
+    given = (*GIVEN, f"{own}:BOTH")
+    return small(folder, trials=3, controllers=controllers, indices=given) | changes
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +54,7 @@ def test_the_result_files(study):
     assert head[4:-2] == names
     about = json.loads(data.attrs["identity"])["index"]
     assert about["mean_1"]["label"] == "mean error of stroke 1"
-    assert "tests.indices.guest" in str(about["mean_1"]["code"])
+    assert "MeanError" in str(about["mean_1"]["code"])
     assert "held" in data and data.held.sel(controller="lqg").values.max() == 0
 
 
@@ -67,7 +73,7 @@ def test_the_tables(study):
 
 
 def test_matlab_and_page(study, tmp_path):
-    write_mat(study.dataset, tmp_path / "study.mat", study_signals(study))
+    write_mat(study.dataset, tmp_path / "study.mat", study.stored_signals())
     stored = scipy.io.loadmat(tmp_path / "study.mat")
     assert "mean_2" in [str(np.squeeze(n)) for n in stored["index"].ravel()]
     page = trial_payload(study, np.arange(4))
@@ -122,6 +128,27 @@ def test_another_set_is_another_study(study, tmp_path):
     assert not [text for text in says.said if "set aside" in text]
     with pytest.raises(InputError, match="indices: "):
         run_study(settings(folder, signals=False, indices=("benchmark",)))
+
+
+def test_it_is_replayed_without_its_file(tmp_path):
+    """The run has a copy, which it names; a file of another content is another study."""
+    motion = short_motion()
+    shake, folder, own = tmp_path / "one.csv", tmp_path / "run", tmp_path / "own.py"
+    time = np.arange(motion.acceleration.size) / motion.fs
+    np.savetxt(shake, np.c_[time, motion.acceleration], delimiter=",")
+    given = settings(folder, controllers=("passthrough",), motions=(str(shake),))
+    run_study(given)
+    kept = [path.name for path in (folder / FILES).iterdir()]
+    assert len(kept) == 1 and kept[0].startswith("own-")
+    content = own.read_text("utf-8")
+    own.unlink()
+    moved = folder.rename(tmp_path / "moved")
+    assert replay(moved, 1).differing == []
+    changed = content.replace("jnp.abs", "2 * jnp.abs")
+    assert changed != content
+    own.write_text(changed, "utf-8")
+    with pytest.raises(InputError, match="mean_1"):
+        run_study(given | {"out": str(moved)})
 
 
 def test_a_part_of_other_names_is_not_taken(tmp_path):

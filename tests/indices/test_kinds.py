@@ -192,10 +192,11 @@ def floor_of(benchmark, motion):
 def test_the_floor_on_a_built_in_motion(benchmark):
     """The noise's deviation over the target's rms, within what a draw and the error allow."""
     share, target = floor_of(benchmark, load_motion("elcentro-like", scale=0.4, fs=1024))
-    deviation = np.sqrt(SensorNoise().power * benchmark.fs)
+    deviation = np.sqrt(SensorNoise().noise_power * benchmark.fs)
     np.testing.assert_allclose(share, 100 * deviation / target, rtol=0.03)
 
 
+@pytest.mark.slow
 def test_the_floors_on_the_real_records(benchmark, records):
     """3.12 and 1.63 % of the reference's strokes, mean of El Centro, Kobe and Morgan Hill; of the
     loop's own targets, which are smaller, 3.41 and 1.74 %."""
@@ -244,7 +245,9 @@ class Other(Kind):
         ("J2_3", r"'J2_3' is unknown; the nearest are .*J2_1"),
         (["J2", 5], "but got int"),
         ([], "at least one"),
-        ("tests.indices.guest:NONE", "cannot be imported: AttributeError"),
+        ("tests.indices.guest:MEEN", "'MEEN', which is not there; did you mean 'MEAN'"),
+        ("tests.indices.none:MEAN", "cannot be imported: ModuleNotFoundError"),
+        ("none/own.py:MEAN", "Index file none/own.py cannot be read"),
         ("tests.indices.guest:MeanError", "must be an Index"),
         ([Index("J2_1", "mm", Other(), Pair.of("x_m", "x_a", 0))], "called 'J2_1'"),
     ],

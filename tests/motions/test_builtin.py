@@ -75,6 +75,7 @@ def test_built_in_is_not_the_record_in_disguise():
     assert np.abs(np.correlate(real, made, "full")).max() / scale < 0.6
 
 
+@pytest.mark.slow
 def test_making_is_repeatable_and_stable_against_rounding():
     facts = builtin_facts("elcentro")
     start = random_start(facts, 7)
@@ -110,6 +111,7 @@ def test_gradient_of_the_spectrum_is_its_derivative():
     np.testing.assert_allclose(misfit - moved, expected, atol=1e-4 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_ensemble_is_different_accepted_and_readable(tmp_path):
     lines = write_ensemble("elcentro", 2, tmp_path / "e", seed=1)
     assert [line["accepted"] for line in lines] == [True, True]

@@ -63,6 +63,7 @@ def test_unknown_format_is_refused(dataset):
         render(dataset, "html")
 
 
+@pytest.mark.slow
 def test_replay_gives_the_study_s_bits_and_keeps_the_signals(tmp_path):
     motion, folder = burst(0.15), tmp_path / "run"
     motion_file = tmp_path / "shake.csv"

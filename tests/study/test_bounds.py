@@ -124,7 +124,7 @@ def test_the_title_counts_trials_with_all_indices(tmp_path):
     value = outcome(4).value
     value[2, 15:] = np.inf  # a motion of zeros: nothing to divide by
     run.write("passthrough", "one", np.arange(4), outcome(4, value=value))
-    titles = [table.title for table in summarise(write_results(run)).tables]
+    titles = [table.title for table in summarise(write_results(run).dataset).tables]
     assert "passthrough on one: 2 of 3 trials" in titles
 
 

@@ -66,7 +66,7 @@ def tables(tmp_path_factory):
     for i, cell in enumerate(run.cells):
         value = -1e3 * outcome(13, i).value
         run.write(*cell, np.arange(13), outcome(13, value=value))
-    found = {t.title: t.__rich__() for t in summarise(write_results(run)).tables}
+    found = {t.title: t.__rich__() for t in summarise(write_results(run).dataset).tables}
     measures = {"PGA": 3.1, "PGV": 0.376, "Arias": 1.849, "CAV": 12.9, "D5-95": 23.8, "Sa": 8.05}
     info = [
         MotionInfo("morganhill-like", "built-in", 0.005, 39.97, measures),
@@ -77,7 +77,7 @@ def tables(tmp_path_factory):
     rows = [{"index": "J2_1", "start": 1234.567, "tuned": 0.01, "published": 3.9},
             {"index": "diverged [%]", "start": 0.0, "tuned": 100.0, "published": ""}]  # fmt: skip
     found["tune"] = tune._table(rows, "adfc", "kobe-like", 128)
-    heads = ("lambda", "noise_power", "spread", "lost [%]", *(f"J{i}_1" for i in range(9)))
+    heads = ("pull", "noise_power", "spread", "lost [%]", *(f"J{i}_1" for i in range(9)))
     cells = [(f"1e-{i}", "1.5e-07", "1", "0.0", *["-1234. / 5678."] * 9) for i in range(10, 14)]
     found["sweep"] = Table("adfc on one", heads, cells, ("Median.",), keys=3).__rich__()
     return found

@@ -96,7 +96,7 @@ def test_a_file_sets_the_number_of_trials_and_unstable_plants_are_refused(tmp_pa
 
 
 def test_a_study_of_exported_plants_is_the_same_study(tmp_path):
-    from martths_jax.campaign.export import export_plants
+    from martths_jax.campaign.formats.plants import export_plants
     from martths_jax.study import run_study
 
     first = run_study(small(tmp_path / "a"))

@@ -18,7 +18,7 @@ from martths_jax.figures.style import Drawing, new_figure, save
 from martths_jax.study import make_config
 from martths_jax.campaign.dataset import save_dataset, write_dataset
 from martths_jax.campaign.draws import write_plants
-from martths_jax.campaign.export import write_csv, write_mat
+from martths_jax.campaign.formats.mat import write_mat
 from martths_jax.campaign.files import write_text, writing
 from martths_jax.campaign.plan import build_plan
 from martths_jax.campaign.session import header
@@ -31,7 +31,8 @@ motion = Motion("m", np.ones(600), 1024.0)
 plan = build_plan(make_config(trials=40, motions=(motion,), controllers=("passthrough",)))
 run = RunFolder.start(out / "run", header(plan, ""))
 run.write("passthrough", "m", np.arange(41), outcome(41))
-dataset = write_results(run)
+done = write_results(run)
+dataset = done.dataset
 run.close()
 figure = new_figure(80, 60)
 figure.subplots().plot(np.random.rand(2000), "o")
@@ -46,7 +47,7 @@ def grow(path):
 writers = {
     "study.nc": lambda p: save_dataset(dataset, p),
     "signals.nc": grow,
-    "study.csv": lambda p: write_csv(dataset, p),
+    "study.csv": lambda p: done.write_csv(p),
     "study.mat": lambda p: write_mat(dataset, p),
     "plants.csv": lambda p: write_plants(plan.draws.plants(np.arange(1, 41)), p),
     "summary.md": lambda p: write_text(p, "x" * 2 * limit),

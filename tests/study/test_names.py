@@ -10,7 +10,6 @@ import pytest
 
 from martths_jax import InputError
 from martths_jax.campaign.config import make_config
-from martths_jax.campaign.export import write_csv
 from martths_jax.campaign.plan import build_plan
 from martths_jax.campaign.session import header
 from martths_jax.campaign.store import RunFolder
@@ -104,8 +103,7 @@ def test_tables_of_hostile_names_read_back(tmp_path):
     )
     for i, cell in enumerate(run.cells):
         run.write(*cell, np.arange(4), outcome(4, i))
-    dataset = write_results(run)
-    write_csv(dataset, tmp_path / "again.csv")
+    write_results(run).write_csv(tmp_path / "again.csv")
     for path in (tmp_path / "study.csv", tmp_path / "again.csv"):
         rows = list(csv.reader(path.open(encoding="utf-8", newline="")))
         assert {len(row) for row in rows} == {30} and len(rows) == 1 + 5 * 4

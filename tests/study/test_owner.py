@@ -52,6 +52,7 @@ def paused(folder, environment):
     return process
 
 
+@pytest.mark.slow
 def test_whoever_comes_second_is_told(tmp_path, compile_cache):
     folder = tmp_path / "run"
     process = paused(folder, compile_cache)

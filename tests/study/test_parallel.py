@@ -46,6 +46,7 @@ def free_port() -> int:
         return s.getsockname()[1]
 
 
+@pytest.mark.slow
 def test_two_processes_of_the_distributed_runtime(whole, tmp_path, compile_cache):
     port = free_port()
     environment = compile_cache | {"MARTHS_DEVICES": "1"}

@@ -16,13 +16,13 @@ from typer.testing import CliRunner
 from martths_jax import InputError
 from martths_jax.campaign import memory as memory_module
 from martths_jax.campaign.dataset import read_dataset, write_dataset
-from martths_jax.campaign.export import write_mat
 from martths_jax.campaign.files import writing
-from martths_jax.campaign.memory import choose_chunk, lane_bytes
+from martths_jax.campaign.formats.mat import write_mat
+from martths_jax.campaign.memory import choose_chunk, lane_bytes, running_bytes
 from martths_jax.campaign.progress import Lines, Tally
 from martths_jax.campaign.store import FORMAT
 from martths_jax.cli import app
-from martths_jax.indices import NAMES
+from martths_jax.indices import NAMES, choose
 from martths_jax.study import run_study
 from martths_jax.study.signals import group
 from tests.study.places import SAMPLES, short_motion, small
@@ -180,6 +180,13 @@ def test_the_chunk_follows_the_memory(monkeypatch):
     devices, chunk = choose_chunk(52_162, 1, 128, 2)
     assert devices == 2 and chunk == 256 and chunk * each <= 0.5e9
     assert choose_chunk(SAMPLES, 1, 128, 2)[1] == 256 * 16
+    spectra = running_bytes(choose("frequency"), 1024.0)
+    assert spectra > 4 * 16384 * 8 > 100 * running_bytes(choose("benchmark"), 1024.0)
+    both = choose_chunk(SAMPLES, 1, 128, 2, memory_gb=0.2, running=spectra)
+    assert both[0] * 128 * spectra + both[1] * lane_bytes(SAMPLES, 1) <= 0.2e9
+    assert both < choose_chunk(SAMPLES, 1, 128, 2, memory_gb=0.2)
+    with pytest.raises(InputError, match="memory_gb"):
+        choose_chunk(SAMPLES, 1, 128, 2, memory_gb=0.05, running=spectra)
     free["available"] = 0.5e9
     assert choose_chunk(52_162, 1, 128, 16) == (1, 128)
     assert choose_chunk(52_162, 1, 128, 2, memory_gb=0.5)[0] == 2

@@ -91,6 +91,7 @@ run_study(small({folder!r}, trials=300, memory_gb=ONE_BLOCK))
 """
 
 
+@pytest.mark.slow
 def test_killed_and_rerun_gives_the_same_files(whole, tmp_path, compile_cache):
     root = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))
     code = VICTIM.format(root=root, folder=str(tmp_path))

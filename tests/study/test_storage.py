@@ -244,9 +244,13 @@ def test_machines_that_compile_otherwise_do_not_mix_unasked(whole, copy, tmp_pat
         tmp_path / "c", [tmp_path / "a", tmp_path / "b"], signals=False, allow_mixed=True,
         reporter=says,
     )  # fmt: skip
-    assert any("mixed" in text for text in says.said)
+    assert sum("mixed" in text for text in says.said) == 1
     assert len(json.loads(merged.dataset.attrs["machines"])) == 2
     assert open_study(tmp_path / "c").dataset.value.equals(whole.dataset.value)
+    says = Says()
+    shares = [tmp_path / "a", tmp_path / "b"]
+    merge_runs(tmp_path / "a", shares, signals=False, allow_mixed=True, reporter=says)
+    assert sum("mixed" in text for text in says.said) == 1, "a folder that is there says it itself"
 
 
 def test_flags_that_change_no_number_do_not_count():

@@ -8,7 +8,7 @@ from martths_jax.campaign.config import make_config
 from martths_jax.campaign.lanes import Worlds
 from martths_jax.control import registry
 from martths_jax.control.registry import find
-from martths_jax.sweep import make_sweep, run_sweep
+from martths_jax.sweep import axes, make_sweep, run_sweep
 from martths_jax.sweep.axes import axis_values as values_of
 from martths_jax.sweep.axes import scalars
 from martths_jax.sweep.grid import cell_numbers, job_config
@@ -27,7 +27,7 @@ def overlap(way, value, nb, fs):
 
 
 def test_ranges_and_lists():
-    logs = axis_values("lambda", "1e-8:1e-4:log9")
+    logs = axis_values("pull", "1e-8:1e-4:log9")
     assert np.allclose(np.diff(np.log10(logs)), 0.5) and (logs[0], logs[-1]) == (1e-8, 1e-4)
     assert axis_values("scale", "0.1:1:lin4") == pytest.approx((0.1, 0.4, 0.7, 1.0))
     assert axis_values("q", "1e-6, 1e-5") == (1e-6, 1e-5)
@@ -45,8 +45,8 @@ def test_ranges_and_lists():
         ("nb", "8,64,64", "at least 9 (samples), but got 8.  Axis `nb` has 64 more than once"),
         ("hop", "0,1", "at least 1"),
         ("no_fraction", "0.5,1.2", "be a number from 0 to 1, but got 1.2"),
-        ("lambda", "-1e-8", "be a number of at least 0 (mm^2)"),
-        ("lambda", "0:1:log5", "must be positive"),
+        ("pull", "-1e-8", "be a number of at least 0 (mm^2)"),
+        ("pull", "0:1:log5", "must be positive"),
         ("q", "a,b", "must be numbers"),
         ("scale", "0:1:lin3", "not zero"),
         ("alpha", "95", "between 0 and 90"),
@@ -62,13 +62,13 @@ def test_refused_values(name, text, part):
 def test_everything_wrong_is_named_at_once_and_before_anything_runs(tmp_path):
     with pytest.raises(InputError) as caught:
         run_sweep(
-            [("nb", "64,128"), ("no", "32,64,100,127"), ("lamda", "1"),
+            [("nb", "64,128"), ("no", "32,64,100,127"), ("pul", "1"),
              ("nb", "256"), ("q", "")],
             {"seed": -1}, shown=("J2_1", "J2_9"), out=str(tmp_path / "out"),
         )  # fmt: skip
     text = str(caught.value)
     for part in (
-        "Axis 'lamda' is unknown; the nearest are lambda",
+        "Axis 'pul' is unknown; the nearest are pull",
         "`nb` is given twice",
         "`q` has no values",
         "Argument `seed`",
@@ -124,7 +124,7 @@ def test_every_sample_stays_every_sample_where_only_nb_moves():
 
 def test_cells_share_batches_and_jobs():
     grid = make_sweep(
-        {"nb": (64, 128), "hop": (1, 8), "lambda": (0, 1e-6), "q": (1e-5, 3e-5)},
+        {"nb": (64, 128), "hop": (1, 8), "pull": (0, 1e-6), "q": (1e-5, 3e-5)},
         controllers=("adfc", "lqg", "passthrough"),
     ).grid
     sizes = sorted(len(batch) for batch in grid.batches())
@@ -134,17 +134,17 @@ def test_cells_share_batches_and_jobs():
 
 def test_an_axis_changes_its_own_scalar_only():
     """Where lambda moves, the guarded controller is still pulled towards the inverse plant."""
-    sweep = make_sweep({"lambda": (1e-6,)})
+    sweep = make_sweep({"pull": (1e-6,)})
     config = job_config(sweep.grid.jobs["adfc"][0], sweep.study)
     assert config.controller["adfc"] == {"towards": "inverse", "pull": 1e-6}
     given = make_config({"controllers": ("adfc",), "controller": {"adfc": {"pull": 0.0}}})
-    sweep = make_sweep({"lambda": (1e-6,)}, given)
+    sweep = make_sweep({"pull": (1e-6,)}, given)
     config = job_config(sweep.grid.jobs["adfc"][0], sweep.study)
     assert config.controller["adfc"] == {"towards": "start", "pull": 1e-6}
 
 
 def test_every_scalar_sets_something_known():
-    settings = {"nb", "no", "pull", "q", "scale", "fs", "spread", "noise_power", "alpha", "p"}
+    settings = {"nb", "no", "pull", "q", "scale", "fs", "spread", "noise_power", "alpha", "arm"}
     assert {s.setting for s in scalars().values()} == settings
 
 
@@ -155,12 +155,19 @@ def test_cells_keep_what_the_study_makes_the_force_from():
 
 
 def test_a_parameter_called_like_an_axis_of_the_study_is_told_apart(monkeypatch):
-    own = Entry("mine", Passthrough, parameters=(Parameter("p", default=1.0, unit="samples"),))
+    own = Entry("mine", Passthrough, parameters=(Parameter("arm", default=1.0, unit="samples"),))
     monkeypatch.setattr(registry, "ENTRIES", (*registry.ENTRIES, own))
-    sweep = make_sweep({"mine.p": (2.0, 3.0), "p": (0.2,)}, controllers=("mine",))
+    sweep = make_sweep({"mine.arm": (2.0, 3.0), "arm": (0.2,)}, controllers=("mine",))
     first = sweep.grid.jobs["mine"][0]
-    assert first.get("p") == 0.2 and first.get("mine.p") == 2.0
-    assert job_config(first, sweep.study).controller["mine"] == {"p": 2.0}
-    assert cell_numbers(sweep.grid, sweep.study)["cell_p"][0].ravel().tolist() == [2.0, 3.0]
-    alone = make_sweep({"mine.p": (2.0, 3.0)}, controllers=("mine",)).grid.jobs["mine"][0]
-    assert alone.get("p") is None, "the coupler's arm does not move"
+    assert first.get("arm") == 0.2 and first.get("mine.arm") == 2.0
+    assert job_config(first, sweep.study).controller["mine"] == {"arm": 2.0}
+    assert cell_numbers(sweep.grid, sweep.study)["cell_arm"][0].ravel().tolist() == [2.0, 3.0]
+    alone = make_sweep({"mine.arm": (2.0, 3.0)}, controllers=("mine",)).grid.jobs["mine"][0]
+    assert alone.get("arm") is None, "the coupler's arm does not move"
+
+
+@pytest.mark.parametrize(("former", "name"), axes.RENAMED.items())
+def test_a_former_name_of_an_axis_is_refused_with_its_new_one(former, name):
+    with pytest.raises(InputError, match=f"Axis '{former}' is called `{name}` now"):
+        make_sweep({former: (0.2,)})
+    assert name in axes.scalars()

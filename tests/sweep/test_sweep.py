@@ -89,7 +89,7 @@ def test_an_adfc_cell_is_what_simulate_gives(tmp_path):
     """Hops and pulls beside each other in one block, each as if alone."""
     motion = short_motion("one")
     sweep = run_sweep(
-        {"nb": (48,), "hop": (1, 16), "lambda": (1e-6, 1e-4)}, trials=20, motions=(motion,),
+        {"nb": (48,), "hop": (1, 16), "pull": (1e-6, 1e-4)}, trials=20, motions=(motion,),
         controllers=("adfc", "passthrough"), out=str(tmp_path), figures=False, devices=1,
     )  # fmt: skip
     plants = draw_plants(20, seed=1)
@@ -98,12 +98,12 @@ def test_an_adfc_cell_is_what_simulate_gives(tmp_path):
     both = [chosen[i >= 10] for i in range(20)]
     values = table(simulate(build_benchmark(), both, plants, motion, SensorNoise(seed=1)))
     cells = sweep.dataset.value.sel(nb=48, controller="adfc", motion="one", trial=plants.trial)
-    first = cells.sel({"hop": 1, "lambda": 1e-4}).values
-    second = cells.sel({"hop": 16, "lambda": 1e-6}).values
+    first = cells.sel({"hop": 1, "pull": 1e-4}).values
+    second = cells.sel({"hop": 16, "pull": 1e-6}).values
     assert np.all(np.isfinite(values))
     assert np.array_equal(first[:10], values[:10]) and np.array_equal(second[10:], values[10:])
     assert not np.array_equal(first[10:], values[10:]), "the cells differ"
-    assert sweep.dataset.cell_no.sel({"hop": 16, "lambda": 1e-6, "controller": "adfc"}).item() == 32
+    assert sweep.dataset.cell_no.sel({"hop": 16, "pull": 1e-6, "controller": "adfc"}).item() == 32
     # What has no buffer is run once and stands in all cells.
     assert len(list((tmp_path / "parts").iterdir())) == 4 + 1
     other = sweep.dataset.value.sel(controller="passthrough", motion="one").values
@@ -113,14 +113,14 @@ def test_an_adfc_cell_is_what_simulate_gives(tmp_path):
 def test_surroundings_are_axes_too(tmp_path):
     motion = short_motion("one")
     sweep = grid(
-        tmp_path, axes={"alpha": (20.0, 30.0), "p": (0.25,), "spread": (0.5, 1.0)},
+        tmp_path, axes={"alpha": (20.0, 30.0), "arm": (0.25,), "spread": (0.5, 1.0)},
         motions=(motion,), trials=5, figures=False,
     )  # fmt: skip
     benchmark = build_benchmark(coupler=build_coupler(0.25, 20.0))
     plants = draw_plants(5, seed=1, spread=0.5)
     result = simulate(benchmark, Passthrough(), plants, motion, SensorNoise(seed=1))
     cells = sweep.dataset.value.sel(controller="passthrough", motion="one", trial=plants.trial)
-    cells = cells.squeeze("p")
+    cells = cells.squeeze("arm")
     assert np.array_equal(cells.sel(alpha=20.0, spread=0.5).values, table(result))
     flat = cells.stack(cell=("alpha", "spread")).transpose("cell", ...).values
     assert all(not np.array_equal(flat[0], other) for other in flat[1:])

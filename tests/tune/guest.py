@@ -25,5 +25,5 @@ class Lead(Controller):
         return jnp.zeros((2, trials))
 
     def step(self, state, seen):
-        rate = (seen.target_mm - state) / seen.dt
-        return seen.target_mm, Decision(command_mm=seen.target_mm + self.lead * rate)
+        rate = (seen.x_a - state) / seen.dt
+        return seen.x_a, Decision(u=seen.x_a + self.lead * rate)

@@ -87,6 +87,7 @@ def tuned(*words):
     assert done.exit_code == 0, done.output
 
 
+@pytest.mark.slow
 def test_a_controller_of_a_file_is_tuned_and_goes_on_by_its_configuration(tmp_path, short_motion):
     other, out = tmp_path / "other.csv", tmp_path / "out"
     other.write_bytes(short_motion.read_bytes())
@@ -106,3 +107,18 @@ def test_a_controller_of_a_file_is_tuned_and_goes_on_by_its_configuration(tmp_pa
     assert float(rows[2]["tuned"]) < float(rows[2]["start"]), "J2_1"
     design = json.loads((out / "design.json").read_text())
     assert design["controller"] == "lead" and design["lead"] > 0.002
+
+
+@pytest.mark.parametrize("source", ["estimate", "measurement"])
+def test_it_tunes_the_rig_whose_force_is_asked_for(short_motion, tmp_path, monkeypatch, source):
+    class Reached(Exception):
+        pass
+
+    def run_tuning(benchmark, *args, **more):
+        raise Reached(benchmark.force_from)
+
+    monkeypatch.setattr("martths_jax.cli.tune.run_tuning", run_tuning)
+    words = ["tune", "--motion", str(short_motion), "--force-from", source, "--trials", "2",
+             "--out", str(tmp_path / "out")]  # fmt: skip
+    done = CliRunner().invoke(app, words)
+    assert isinstance(done.exception, Reached) and done.exception.args == (source,)

@@ -45,6 +45,7 @@ def motion():
     return replace(whole, acceleration=whole.acceleration[first : first + 2048])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["lqg", "adfc"])
 def test_gradient_through_checkpointed_segments(benchmark, motion, kind):
     """Reverse mode against finite differences and forward mode, over three windows."""

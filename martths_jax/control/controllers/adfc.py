@@ -187,7 +187,7 @@ ENTRY = Entry(
     parameters=(
         Parameter("nb", "Nb", "buffer length", 1024, "samples", 9, whole=True, kind="static"),
         Parameter("no", "No", "overlap", 1023, "samples", 0, whole=True),
-        Parameter("pull", "lambda", "pull", None, "mm^2", 0.0, kind="tunable", axis="lambda"),
+        Parameter("pull", "lambda", "pull", None, "mm^2", 0.0, kind="tunable"),
         Parameter("q", "q", "process noise", 3e-5, "mm^2", 0.0, above=True, kind="tunable"),
         Parameter("towards", "", "what the pull goes to", None, choices=ANCHORS, kind="static"),
         Parameter("solver", "", "solver", "ldl", choices=tuple(ls.SOLVERS), kind="static"),

@@ -166,18 +166,18 @@ class AdaptiveFeedforward(Controller):
         memory = self.low_pass.init((ACTUATORS, trials)) if self.low_pass else ()
         return memory, self.regressor.init(trials)
 
-    def taught(self, before, measured_mm: jax.Array, estimate_mm: jax.Array):
+    def taught(self, before, x_m: jax.Array, x_hat: jax.Array):
         """What a sample's strokes teach.
 
         Args:
             before: what was remembered, at first from ``init_taught``.
-            measured_mm, estimate_mm: (2, T) x_m(k), x_hat(k).
+            x_m, x_hat: (2, T) x_m(k), x_hat(k).
 
         Returns:
             what to remember; (2, T) strokes [mm]; for each its regressors (T,).
         """
         memory, past = before
-        strokes = measured_mm if self.learns_from == "measurement" else estimate_mm
+        strokes = x_m if self.learns_from == "measurement" else x_hat
         if self.low_pass:
             memory, strokes = self.low_pass.step(memory, strokes)
         past, phi = self.regressor.step(past, strokes)
@@ -193,11 +193,11 @@ class AdaptiveFeedforward(Controller):
         return state | {"fits": tuple(self.fit.renew(one) for one in state["fits"])}
 
     def step(self, state, seen):
-        taught, strokes, phi = self.taught(state["taught"], seen.measured_mm, seen.estimate_mm)
+        taught, strokes, phi = self.taught(state["taught"], seen.x_m, seen.x_hat)
         left, leaving, phi_leaving = seen.delayed, (), None
         if self.fit.memory:
             leaving, phi_leaving = self.regressor.step(state["leaving"], left[:ACTUATORS])
-        target, phi_target = self.regressor.step(state["target"], seen.target_mm)
+        target, phi_target = self.regressor.step(state["target"], seen.x_a)
 
         # u(k-1) is the last command that the strokes at k can have felt.
         applied, heard = state["command"], ()
@@ -230,7 +230,7 @@ class AdaptiveFeedforward(Controller):
         }
         record = jnp.concatenate([strokes, jnp.stack(applied)]) if self.fit.memory else None
         signals = {"C_A": jnp.stack([jnp.stack(row) for row in coefficients]), "held": held}
-        return state, Decision(command_mm=jnp.stack(u), record=record, signals=signals)
+        return state, Decision(u=jnp.stack(u), record=record, signals=signals)
 
     def _of(self, part: Part, phi) -> tuple:
         """A part's regressors from those of all strokes."""

@@ -42,10 +42,10 @@ class FrozenFeedforward(Controller):
         return self.regressor.init(trials)
 
     def step(self, state, seen):
-        state, phi = self.regressor.step(state, seen.target_mm)
+        state, phi = self.regressor.step(state, seen.x_a)
         C = self.coefficients
         rows = tuple(tuple(C[j, i] for i in range(ACTUATORS)) for j in range(C.shape[0]))
-        return state, Decision(command_mm=jnp.stack(command(self.law, rows, phi, self.joint)))
+        return state, Decision(u=jnp.stack(command(self.law, rows, phi, self.joint)))
 
 
 def command(law: Law, coefficients: Coefficients, phi: Sequence, joint: bool) -> tuple:

@@ -146,10 +146,10 @@ class LQG(Controller):
         return jnp.zeros((2, trials))
 
     def step(self, state, seen):
-        reached = seen.measured_mm if self.error == "measured" else seen.estimate_mm
-        error = state + seen.dt * (seen.target_mm - reached)
+        reached = seen.x_m if self.error == "measured" else seen.x_hat
+        error = state + seen.dt * (seen.x_a - reached)
         command = -contract(self.K_z, seen.state, axes=2) - contract(self.K_e, error)
-        return error, Decision(command_mm=command, signals={"error_integral": error})
+        return error, Decision(u=command, signals={"error_integral": error})
 
 
 def _pairs(w) -> dict:

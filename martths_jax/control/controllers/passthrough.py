@@ -39,7 +39,7 @@ class Passthrough(Controller):
         return ()
 
     def step(self, state, seen):
-        return state, Decision(command_mm=seen.target_mm)
+        return state, Decision(u=seen.x_a)
 
 
 ENTRY = Entry(

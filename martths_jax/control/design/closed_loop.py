@@ -46,7 +46,7 @@ def tracking_radius(plant, filter_gain, step, dt: float, outer=None) -> float:
     slots = np.swapaxes(corrected.reshape(n // 2, 2, -1), 0, 1)
     seen = Observation(1, dt, target, measured, estimate, slots, None)
     kept, decision = step(kept, seen)
-    u = np.asarray(decision.command_mm)
+    u = np.asarray(decision.u)
     ahead = [A @ z + B @ u, A @ corrected + B @ u, np.asarray(kept), *after]
     return float(np.abs(np.linalg.eigvals(np.concatenate(ahead))).max())
 

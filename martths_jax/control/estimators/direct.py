@@ -19,10 +19,10 @@ class DirectMeasurement(Estimator):
         """Nothing to remember, (2, 0, T)."""
         return jnp.zeros((2, 0, trials))
 
-    def correct(self, predicted, measured_mm):
+    def correct(self, predicted, x_m):
         """The measurement itself."""
-        return predicted, measured_mm
+        return predicted, x_m
 
-    def predict(self, state, command_mm):
+    def predict(self, state, u):
         """Nothing to predict."""
         return state

@@ -45,15 +45,15 @@ class KalmanFilter(Estimator):
         """Prediction for k = 0: the plant at rest, (2, m, T)."""
         return jnp.zeros(self.model.a.shape[:2] + (trials,))
 
-    def correct(self, predicted: jax.Array, measured_mm: jax.Array) -> tuple[jax.Array, jax.Array]:
+    def correct(self, predicted: jax.Array, x_m: jax.Array) -> tuple[jax.Array, jax.Array]:
         """Corrected state (2, m, T) and estimated strokes (2, T) [mm]."""
-        innovation = measured_mm - output(self.model, predicted)
+        innovation = x_m - output(self.model, predicted)
         state = predicted + spread(self.filter_gain, innovation)
         return state, output(self.model, state)
 
-    def predict(self, state: jax.Array, command_mm: jax.Array) -> jax.Array:
+    def predict(self, state: jax.Array, u: jax.Array) -> jax.Array:
         """Prediction for the next sample from the corrected state and the command (2, T)."""
-        return advance(self.model, state, command_mm)
+        return advance(self.model, state, u)
 
 
 def steady_state_gains(A, B, C, q: float, r: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

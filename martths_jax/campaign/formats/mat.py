@@ -1,31 +1,21 @@
-"""Results for other tools: tidy CSV, MATLAB file, plants as CSV."""
+"""Results as a MATLAB file."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from scipy.io import savemat
 
-from martths_jax.campaign.draws import write_plants
+from martths_jax.campaign.assembly import Results
 from martths_jax.campaign.files import writing
-from martths_jax.campaign.tidy import write_runs
+from martths_jax.campaign.formats.base import Format
 from martths_jax.errors import InputError
-from martths_jax.plant import Plants
 
 #: Largest variable that MATLAB reads from such a file [bytes].
 MOST_BYTES = 2**31 - 2**16
-
-
-def write_csv(dataset: xr.Dataset, path: Path) -> None:
-    """One row a controller, motion and trial: status, indices, peak volts.
-
-    Numbers have all their digits; an index of a trial that diverged is empty.
-    """
-    write_runs(dataset, path, after=["volt_peak"])
 
 
 def write_mat(dataset: xr.Dataset, path: Path, signals: Iterable[xr.Dataset] = ()) -> None:
@@ -36,9 +26,9 @@ def write_mat(dataset: xr.Dataset, path: Path, signals: Iterable[xr.Dataset] = (
     Args:
         dataset: of a study.
         path: of the file.
-        signals: of each motion and controller, see ``study_signals``; they become the struct array
-            ``signals`` with the fields ``motion``, ``controller``, ``trial``, ``role``, ``time``
-            and one a signal, and the structs ``signal_dims`` and ``signal_units``.
+        signals: of each motion and controller, see ``Results.stored_signals``; they become the
+            struct array ``signals`` with the fields ``motion``, ``controller``, ``trial``,
+            ``role``, ``time`` and one a signal; ``signal_dims`` and ``signal_units`` are structs.
 
     Raises:
         InputError: if the results are beyond what this format holds (2 GB a variable).
@@ -55,15 +45,6 @@ def write_mat(dataset: xr.Dataset, path: Path, signals: Iterable[xr.Dataset] = (
         found["signal_dims"] = {n: np.array(v.dims, dtype=object) for n, v in first.items()}
         found["signal_units"] = {n: v.attrs.get("units", "1") for n, v in first.items()}
     save_mat(path, found)
-
-
-def study_signals(study) -> Iterator[xr.Dataset]:
-    """Stored signals of each motion and controller of a ``Study`` with what all share on it."""
-    for motion in study.dataset.motion.values:
-        shared = study.signals(str(motion))
-        for controller in study.dataset.controller.values:
-            own = study.signals(str(motion), str(controller))
-            yield own.merge(shared).assign_attrs(motion=str(motion), controller=str(controller))
 
 
 def save_mat(path: Path, found: dict) -> None:
@@ -108,12 +89,8 @@ def _size(values) -> int:
     return values.nbytes
 
 
-def export_plants(dataset: xr.Dataset, path: Path) -> None:
-    """The uncertain plants, trials 1 ... N, as CSV, for ``--plants`` to read back exactly."""
-    write_plants(
-        Plants(dataset.draw.values[1:], dataset.trial.values[1:], _spread(dataset)), Path(path)
-    )
+def _write(done: Results, path: Path, signals: bool) -> None:
+    write_mat(done.dataset, path, done.stored_signals() if signals else ())
 
 
-def _spread(dataset: xr.Dataset) -> float:
-    return float(json.loads(dataset.attrs["identity"])["spread"])
+MAT = Format("mat", "MATLAB file to write", _write)
