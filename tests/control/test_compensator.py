@@ -53,6 +53,7 @@ def test_recorded_signals_give_the_loop_s_commands(kind, benchmark):
         np.testing.assert_allclose(np.moveaxis(values, -1, 0), stored, rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_the_delay_line_comes_out_n_samples_later(benchmark):
     """Longer than its line, so that it has gone through several times and was renewed."""
     box = Compensator.of(ADFC(nb=9, no=8), benchmark)

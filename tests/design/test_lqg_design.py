@@ -48,6 +48,7 @@ def test_same_controller_as_on_the_host(benchmark, design):
     assert lqg_from_weights(benchmark, START, error="measured").error == "measured"
 
 
+@pytest.mark.slow
 def test_gradient_in_log_weights(benchmark, design):
     def summary(c):
         parts = jax.tree.leaves((c.K_z, c.K_e, c.estimator.filter_gain))

@@ -24,7 +24,9 @@ def systems(count, n, i, seed):
 
 
 @pytest.mark.parametrize("name", SOLVERS)
-@pytest.mark.parametrize(("count", "n", "i"), [(700, 3, 1), (300, 6, 2)])
+@pytest.mark.parametrize(
+    ("count", "n", "i"), [pytest.param(700, 3, 1, marks=pytest.mark.slow), (300, 6, 2)]
+)
 def test_agrees_with_scipy(name, count, n, i):
     ours, scipys = SOLVERS[name]
     given = systems(count, n, i, seed=n)

@@ -153,5 +153,5 @@ def test_draws_that_are_none(given, message):
 def test_text_is_no_draw():
     with pytest.raises(InputError, match="`draws` must be numbers, but got 'abc'"):
         plant_from_draws("abc")
-    with pytest.raises(InputError, match="`power` must be zero or positive and finite"):
+    with pytest.raises(InputError, match="`noise_power` must be zero or positive and finite"):
         SensorNoise(noise_power="loud")

@@ -72,6 +72,7 @@ def test_any_run_ends_with_a_status_and_numbers_that_belong_to_it(
         np.testing.assert_array_equal(alone[name], value[:1], err_msg=name)
 
 
+@pytest.mark.slow
 @PROPERTY
 @given(draws=draws, motion=motions(), exponent=st.integers(-4, 4), seed=st.integers(0, 99))
 def test_scaling_the_units_scales_the_run(benchmark, draws, motion, exponent, seed):

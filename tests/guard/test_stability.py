@@ -83,6 +83,7 @@ def test_what_the_fit_is_pulled_to_is_a_stable_loop_by_itself(fs):
     assert np.all(spectral_radius(benchmark, frozen, plants) < 1)
 
 
+@pytest.mark.slow
 def test_delay_margin_against_whole_samples_of_delay(benchmark):
     """The LQG loop bears some samples; commands that are delayed by whole ones say the same."""
     lqg, plants = LQG.design(benchmark, error="measured"), draw_plants(3, seed=2)

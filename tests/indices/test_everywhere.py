@@ -135,7 +135,9 @@ def test_it_is_replayed_without_its_file(tmp_path):
     motion = short_motion()
     shake, folder, own = tmp_path / "one.csv", tmp_path / "run", tmp_path / "own.py"
     time = np.arange(motion.acceleration.size) / motion.fs
-    np.savetxt(shake, np.c_[time, motion.acceleration], delimiter=",")
+    head = "time [s],acceleration [m/s^2]"
+    rows = np.c_[time, motion.acceleration]
+    np.savetxt(shake, rows, delimiter=",", header=head, comments="")
     given = settings(folder, controllers=("passthrough",), motions=(str(shake),))
     run_study(given)
     kept = [path.name for path in (folder / FILES).iterdir()]
@@ -166,6 +168,7 @@ def test_a_part_of_other_names_is_not_taken(tmp_path):
     np.testing.assert_array_equal(again, before)
 
 
+@pytest.mark.slow
 def test_shares_are_merged(tmp_path):
     whole = run_study(settings(tmp_path / "whole", controllers=("passthrough",)))
     shares = settings(tmp_path / "shares", controllers=("passthrough",))
@@ -176,6 +179,7 @@ def test_shares_are_merged(tmp_path):
     assert open_study(tmp_path / "shares").dataset.sizes["index"] == 36
 
 
+@pytest.mark.slow
 def test_a_sweep(tmp_path):
     swept = run_sweep(
         {"scale": [1.0, 2.0]},

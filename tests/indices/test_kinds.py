@@ -189,6 +189,7 @@ def floor_of(benchmark, motion):
     return np.array(share), np.sqrt(np.mean(run.signals["x_a"][0] ** 2, axis=0))
 
 
+@pytest.mark.slow
 def test_the_floor_on_a_built_in_motion(benchmark):
     """The noise's deviation over the target's rms, within what a draw and the error allow."""
     share, target = floor_of(benchmark, load_motion("elcentro-like", scale=0.4, fs=1024))

@@ -85,6 +85,7 @@ def test_making_is_repeatable_and_stable_against_rounding():
     np.testing.assert_array_equal(generate(facts, 7), np.round(first, 6))
 
 
+@pytest.mark.slow
 def test_broken_cache_is_passed_over(tmp_path, monkeypatch):
     monkeypatch.setenv("MARTHS_CACHE", str(tmp_path))
     builtin_record.cache_clear()

@@ -24,6 +24,7 @@ def wide_terminal_and_own_cache(tmp_path_factory, monkeypatch):
     monkeypatch.setattr("martths_jax.cli.motions.console.width", 200)
 
 
+@pytest.mark.slow
 def test_list(tmp_path):
     (tmp_path / "mine.csv").write_text("0,0\n0.01,1\n0.02,0\n")
     result = runner.invoke(app, ["--records", str(tmp_path), "--units", "g"])
@@ -42,6 +43,7 @@ def test_show(tmp_path):
     assert "fig.xyz" in str(result.exception)
 
 
+@pytest.mark.slow
 def test_make(tmp_path):
     arguments = ["make", "--like", "elcentro", "--count", "1", "--seed", "3"]
     result = runner.invoke(app, [*arguments, "--out", str(tmp_path / "made")])

@@ -16,6 +16,8 @@ from tests.figures.small_study import LOST, MOTIONS, TRIALS
 from tests.report.chromium import Page, find_chromium
 from tests.tools import missing
 
+pytestmark = pytest.mark.slow
+
 RUNS = 2 * len(MOTIONS) * (TRIALS + 1)
 PAGE = 50
 READY = "document.documentElement?.dataset.ready === 'yes'"

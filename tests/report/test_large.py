@@ -14,6 +14,8 @@ from martths_jax.study import open_study
 from martths_jax.study.summary import number
 from tests.figures.small_study import LOST, MOTIONS, TRIALS, enlarge
 
+pytestmark = pytest.mark.slow
+
 MANY = 4000
 #: Room for the trials of a study with two controllers and two motions.
 SHOWN = payload.RUNS // 4

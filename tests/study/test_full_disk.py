@@ -69,6 +69,7 @@ for name, write in writers.items():
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit on the size of files")
 def test_every_writer_says_what_the_system_refused(tmp_path):
     root = os.path.dirname(os.path.dirname(os.path.dirname(__file__)))

@@ -137,6 +137,7 @@ def test_no_bit_of_run_json_changes_without_a_word(whole, tmp_path, where):
     assert found == json.loads(content)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 @given(where=st.floats(0, 1, exclude_max=True))
 def test_no_bit_of_a_result_file_gives_another_number(whole, tmp_path, where):

@@ -191,6 +191,7 @@ def test_only_free_numbers_move(bowl, tmp_path):
     assert state["best"]["pull"] == -5 and state["best"]["q"] < -3.5
 
 
+@pytest.mark.slow
 def test_gradient_of_plants_and_motions_and_of_other_weights(benchmark, motion):
     """Forward mode against finite differences; one program for all weights of the same indices."""
     short = replace(motion, acceleration=motion.acceleration[512:1100])

@@ -28,8 +28,8 @@ def _spread(dataset: xr.Dataset) -> float:
 def _write(done: Results, path: Path, signals: bool) -> None:
     if "draw" not in done.dataset:
         raise InputError(
-            f"{done.folder} holds a sensitivity analysis, whose design draws the plants; --plants "
-            "takes those of a study or a sweep."
+            f"{done.folder} holds a sensitivity analysis, whose design draws the plants; give the "
+            "folder of a study or a sweep."
         )
     export_plants(done.dataset, path)
 
