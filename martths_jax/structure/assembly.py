@@ -332,9 +332,28 @@ def check_definite(K: np.ndarray, names: Sequence[str], size: np.ndarray | None 
         return
     negative = bool(np.any(values < -none))
     weak = vectors[:, values < (-none if negative else none)]
-    share = np.sqrt(np.sum(weak**2, axis=1))
-    moving = [name for name, s in zip(names, share, strict=True) if s > 0.1 * share.max()]
+    moving = _moving(weak, scale, names)
     shown = ", ".join(moving[:8]) + (f" and {len(moving) - 8} more" if len(moving) > 8 else "")
     if negative:
         raise InputError(f"The stiffness is indefinite: it pushes the motion of {shown} on.")
     raise InputError(f"The frame is a mechanism: nothing resists the motion of {shown}.")
+
+
+def _moving(vectors: np.ndarray, scale: np.ndarray, names: Sequence[str]) -> list[str]:
+    """Names of the coordinates that take a real part in motions.
+
+    Translations are held against translations, rotations against rotations: how long the frame is
+    decides which of the two numbers is larger.
+
+    Args:
+        vectors: (q, k) motions, scaled.
+        scale: (q,) that they were multiplied by.
+    """
+    scaled = np.sqrt(np.sum(vectors**2, axis=1))
+    share = scaled / scale
+    turns = np.array([name.endswith(".rotation") for name in names])
+    part = np.zeros(len(names), dtype=bool)
+    for kind in (turns, ~turns):
+        if np.any(scaled[kind] > 1e-6 * scaled.max()):
+            part |= kind & (share > 0.1 * share[kind].max())
+    return [name for name, moves in zip(names, part, strict=True) if moves]

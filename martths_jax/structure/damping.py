@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from martths_jax.errors import InputError, argument_error, as_numbers
+from martths_jax.errors import InputError, argument_error, as_numbers, check_whole
 from martths_jax.structure.modes import massive
 
 
@@ -34,6 +34,27 @@ def rayleigh_coefficients(omega_1: float, omega_2: float, ratio) -> tuple[float,
             "negative and some modes would gain energy."
         )
     return a_0, a_1
+
+
+def rayleigh_damping(
+    M: np.ndarray, K: np.ndarray, omega: np.ndarray, modes: tuple[int, int], ratio
+) -> np.ndarray:
+    """C = a_0 M + a_1 K with `ratio` of critical damping, one or a pair, in two modes.
+
+    Args:
+        M, K: (n, n) mass and stiffness.
+        omega: (k,) circular frequencies of the modes [rad/s].
+        modes: the two, counted from 1.
+        ratio: see ``rayleigh_coefficients``.
+
+    Raises:
+        InputError: if there are no such modes, or no such damping.
+    """
+    for mode in modes:
+        check_whole("modes", mode, 1, len(omega))
+    first, second = (omega[mode - 1] for mode in modes)
+    a_0, a_1 = rayleigh_coefficients(first, second, ratio)
+    return a_0 * M + a_1 * K
 
 
 def modal_damping(M: np.ndarray, omega: np.ndarray, phi: np.ndarray, ratios) -> np.ndarray:
