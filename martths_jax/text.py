@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import re
+from collections.abc import Iterable
 
 #: Beginnings that make a spreadsheet take a cell for a formula, of full width too.
 _FORMULAS = ("=", "+", "-", "@", "\N{FULLWIDTH EQUALS SIGN}", "\N{FULLWIDTH PLUS SIGN}",
@@ -24,6 +26,22 @@ def shortened(value: object, most: int = 80) -> str:
     except ValueError:  # Python writes out no integer of more than 4300 digits
         return "a number of more than 4300 digits"
     return text if len(text) <= most else f"{text[:most]} ... ({len(text)} characters)"
+
+
+def nearest(name: object, known: Iterable[str]) -> str:
+    """Words on a name that is unknown: the known ones like it, or all where none is."""
+    known = list(known)
+    near = difflib.get_close_matches(str(name), known, n=3)
+    if near:
+        return f"the nearest {'is' if len(near) == 1 else 'are'} {', '.join(near)}"
+    if not known:
+        return "there is none"
+    shown = ", ".join(known[:12])
+    return (
+        f"known are {shown}"
+        if len(known) <= 12
+        else f"known are {shown} and {len(known) - 12} more"
+    )
 
 
 def csv_cell(value: object) -> object:

@@ -14,12 +14,9 @@ import numpy as np
 from scipy import linalg
 
 from martths_jax.errors import argument_error
-from martths_jax.structure.frame import (
-    FORCE_DOFS,
-    Structure,
-    independent_coordinate,
-    rayleigh_coefficients,
-)
+from martths_jax.structure.damping import modal_damping, rayleigh_coefficients
+from martths_jax.structure.frame import FORCE_DOFS, Structure, independent_coordinate
+from martths_jax.structure.modes import condense
 from martths_jax.structure.sections import INCH, check_positive
 
 E_STEEL = 200e9  # Pa
@@ -121,15 +118,12 @@ def measured_frame(quirks: Quirks | None = None) -> ExperimentalFrame:
     omega = np.sqrt(omega_2)
     if quirks.round_frequencies:
         omega = np.round(omega, 2)
-    # Chopra, eq. 11.4.19: C = M (sum 2 zeta omega phi phi^T / modal mass) M.
-    C = M @ phi @ np.diag(2 * 0.05 * omega) @ phi.T @ M
-    return ExperimentalFrame(M=M, C=C, K=K)
+    return ExperimentalFrame(M=M, C=modal_damping(M, omega, phi, 0.05), K=K)
 
 
 def condensation(frame: ExperimentalFrame) -> np.ndarray:
     """(5, 2) map from (x, rotation of node 4) to all five coordinates, by static condensation."""
-    K = frame.K
-    return np.vstack([np.eye(2), -np.linalg.solve(K[2:, 2:], K[2:, :2])])
+    return condense(frame.K, [0, 1])[1]
 
 
 def restoring_maps(frame: ExperimentalFrame, dt: float) -> np.ndarray:

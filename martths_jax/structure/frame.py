@@ -11,9 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
 
-from martths_jax.structure.sections import FrameGeometry, Section
+from martths_jax.structure.assembly import DIRECTIONS, FIXED, PINNED, PlanarFrame, free_matrices
+from martths_jax.structure.constraints import Relation, diaphragm, resolve
+from martths_jax.structure.damping import rayleigh_coefficients
+from martths_jax.structure.members import Material, Member, Node
+from martths_jax.structure.modes import effective_masses, massive, natural_modes
+from martths_jax.structure.sections import FrameGeometry
 
 N_DOF = 38
 N_FREE = 29
@@ -61,96 +65,83 @@ def independent_coordinate(dof: int) -> int:
     return dof - 10
 
 
-def bending_stiffness(section: Section, length: float, E: float, G: float) -> np.ndarray:
-    """(4, 4) Timoshenko stiffness on (v_1, rotation_1, v_2, rotation_2), v to the left of 1-2."""
-    L, EI = length, E * section.I
-    phi = 12 * EI / (G * section.A_s * L**2)
-    return (
-        EI
-        / (L**3 * (1 + phi))
-        * np.array(
-            [
-                [12, 6 * L, -12, 6 * L],
-                [6 * L, (4 + phi) * L**2, -6 * L, (2 - phi) * L**2],
-                [-12, -6 * L, 12, -6 * L],
-                [6 * L, (2 - phi) * L**2, -6 * L, (4 + phi) * L**2],
-            ]
-        )
+def _end(line: int, floor: int) -> str:
+    """Name of a node: 1 to 12 as the benchmark numbers them, base 1 to base 4 below."""
+    return str(3 * line + floor) if floor else f"base {line + 1}"
+
+
+def _dof_names() -> tuple[str, ...]:
+    """The benchmark's degrees of freedom 1 to 38 by name."""
+    nodes = [str(node) for node in range(1, 13)]
+    names = [f"{node}.{direction}" for direction in DIRECTIONS for node in nodes]
+    return (*names, "base 2.rotation", "base 3.rotation")
+
+
+def planar_frame(geometry: FrameGeometry) -> PlanarFrame:
+    """The reference frame as data: nodes, members, supports, masses and diaphragms.
+
+    The origin is the interface node.  Lengths from there are whole multiples of bay and storey,
+    whose differences are exact, so that all members of a kind have the same length to the bit.
+    """
+    g = geometry
+    nodes = {
+        _end(line, floor): Node((line - 1) * g.bay, (floor - 1) * g.storey)
+        for line in range(4)
+        for floor in range(4)
+    }
+    members = {}
+    for line in range(4):
+        for floor in range(3):
+            kind = "interior ground column" if floor == 0 and line in (1, 2) else "column"
+            pinned = {"rigid_end": g.pin_offset, "release": ("end",)}
+            start, end = _end(line, floor), _end(line, floor + 1)
+            members[f"column {start}-{end}"] = Member(
+                start, end, kind, "steel", **(pinned if (line, floor) == (2, 0) else {})
+            )
+    for bay in range(3):
+        for floor in (1, 2, 3):
+            kind = "interior ground beam" if (bay, floor) == (1, 1) else "beam"
+            start, end = _end(bay, floor), _end(bay + 1, floor)
+            members[f"beam {start}-{end}"] = Member(start, end, kind, "steel")
+    masses = {f"{_end(0, floor + 1)}.x": m for floor, m in enumerate(g.storey_mass)}
+    for line, floors in enumerate(g.vertical_mass):
+        masses |= {f"{_end(line, floor)}.y": m for floor, m in enumerate(floors, 1)}
+    return PlanarFrame(
+        nodes=nodes,
+        sections={
+            "column": g.column,
+            "interior ground column": g.interior_ground_column,
+            "beam": g.beam,
+            "interior ground beam": g.interior_ground_beam,
+        },
+        materials={"steel": Material(g.E, g.G)},
+        members=members,
+        supports={"base 1": FIXED, "base 2": PINNED, "base 3": PINNED, "base 4": FIXED},
+        masses=masses,
+        constraints=_diaphragms(),
     )
 
 
-def _released_column(section: Section, length: float, offset: float, E: float, G: float):
-    """(4, 4) column on (v_1, rotation_1, v_2, rotation_2) with a pin `offset` below its top.
-
-    The part below the pin carries no moment at its upper end (that rotation is condensed); the
-    part above is rigid, so the pin moves with v = v_2 - offset * rotation_2.
-    """
-    k = bending_stiffness(section, length - offset, E, G)
-    keep = [0, 1, 2]
-    k = k[np.ix_(keep, keep)] - np.outer(k[keep, 3], k[3, keep]) / k[3, 3]
-    rigid = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -offset]])
-    return rigid.T @ k @ rigid
+def _diaphragms() -> tuple[Relation, ...]:
+    floors = ([_end(line, floor) for line in range(4)] for floor in (1, 2, 3))
+    return tuple(relation for nodes in floors for relation in diaphragm(nodes))
 
 
-def _members(g: FrameGeometry):
-    """Yield (end 1, end 2, bending matrix, axial stiffness, is_column) of every member.
-
-    An end is (line, floor) with lines 0..3 and floors 0 (base) to 3.
-    """
-    for line in range(4):
-        for floor in range(3):
-            ground_interior = floor == 0 and line in (1, 2)
-            section = g.interior_ground_column if ground_interior else g.column
-            if floor == 0 and line == 2:
-                bending = _released_column(section, g.storey, g.pin_offset, g.E, g.G)
-            else:
-                bending = bending_stiffness(section, g.storey, g.E, g.G)
-            yield (line, floor), (line, floor + 1), bending, g.E * section.A / g.storey, True
-    for bay in range(3):
-        for floor in (1, 2, 3):
-            section = g.interior_ground_beam if (bay, floor) == (1, 1) else g.beam
-            bending = bending_stiffness(section, g.bay, g.E, g.G)
-            yield (bay, floor), (bay + 1, floor), bending, 0.0, False
-
-
-def _dofs_of(end: tuple[int, int]) -> tuple[int, int, int]:
-    """Zero-based (x, y, rotation) DOFs of a node, -1 where a base is held."""
-    line, floor = end
-    if floor == 0:
-        return -1, -1, {1: 36, 2: 37}.get(line, -1)
-    node = 3 * line + floor - 1
-    return node, 12 + node, 24 + node
+def _benchmark_matrices(geometry: FrameGeometry) -> tuple[np.ndarray, np.ndarray]:
+    """(K, M), (38, 38) each, before the diaphragms and in the benchmark's order."""
+    names, K, M = free_matrices(planar_frame(geometry))
+    order = np.ix_(*[[names.index(name) for name in _dof_names()]] * 2)
+    return K[order], M[order]
 
 
 def assemble_stiffness(geometry: FrameGeometry) -> np.ndarray:
     """(38, 38) stiffness before the diaphragms are applied [N/m, N, N m]."""
-    K = np.zeros((N_DOF + 1, N_DOF + 1))  # the last row and column collect the held DOFs
-    for end_1, end_2, bending, axial, is_column in _members(geometry):
-        (x1, y1, r1), (x2, y2, r2) = _dofs_of(end_1), _dofs_of(end_2)
-        # A column points up, so its transverse direction (to the left) is -x.
-        transverse, sign = ((x1, x2), -1.0) if is_column else ((y1, y2), 1.0)
-        dofs = [transverse[0], r1, transverse[1], r2]
-        s = np.array([sign, 1.0, sign, 1.0])
-        K[np.ix_(dofs, dofs)] += s[:, None] * bending * s
-        along = [y1, y2] if is_column else [x1, x2]
-        K[np.ix_(along, along)] += axial * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    return K[:N_DOF, :N_DOF]
+    return _benchmark_matrices(geometry)[0]
 
 
 def diaphragm_map() -> np.ndarray:
     """(38, 29) map from the independent coordinates to all DOFs (rigid floors)."""
-    T = np.zeros((N_DOF, N_FREE))
-    for dof in range(1, N_DOF + 1):
-        T[dof - 1, independent_coordinate(dof)] = 1.0
-    return T
-
-
-def rayleigh_coefficients(omega_1: float, omega_2: float, ratio: float) -> tuple[float, float]:
-    """(a_0, a_1) of C = a_0 M + a_1 K with `ratio` of critical damping at two frequencies [rad/s].
-
-    Chopra, Dynamics of Structures, eq. 11.4.10.
-    """
-    return 2 * ratio * omega_1 * omega_2 / (omega_1 + omega_2), 2 * ratio / (omega_1 + omega_2)
+    return resolve(_diaphragms(), _dof_names())[0]
 
 
 def build_reference(
@@ -169,11 +160,7 @@ def build_reference(
     """
     geometry = geometry or FrameGeometry()
     T = diaphragm_map()
-    K = T.T @ assemble_stiffness(geometry) @ T
-    mass = np.zeros(N_FREE)
-    mass[:3] = geometry.storey_mass
-    mass[3:15] = np.ravel(geometry.vertical_mass)
-    M = np.diag(mass)
+    K, M = (T.T @ matrix @ T for matrix in _benchmark_matrices(geometry))
     a_0, a_1 = rayleigh_coefficients(*damping_anchors, damping_ratio)
     influence = np.zeros(N_FREE)
     influence[:3] = 1.0
@@ -182,19 +169,11 @@ def build_reference(
 
 def modes(structure: Structure) -> Modes:
     """Natural modes; the rotations, which carry no mass, are condensed statically (Table 1)."""
-    mass = np.diag(structure.M)
-    m, s = np.flatnonzero(mass > 0), np.flatnonzero(mass == 0)
-    K = structure.K
-    follow = -np.linalg.solve(K[np.ix_(s, s)], K[np.ix_(s, m)])
-    K_condensed = K[np.ix_(m, m)] + K[np.ix_(m, s)] @ follow
-    M = structure.M[np.ix_(m, m)]
-    omega_2, phi = linalg.eigh(K_condensed, M)
-    shape = np.zeros((mass.size, m.size))
-    shape[m], shape[s] = phi, follow @ phi
-    l = structure.influence[m]
-    participation = phi.T @ M @ l
+    omega, shape = natural_modes(structure.M, structure.K)
+    m, l = massive(structure.M), structure.influence
+    total = l[m] @ structure.M[np.ix_(m, m)] @ l[m]
     return Modes(
-        frequency=np.sqrt(omega_2) / (2 * np.pi),
-        effective_mass=participation**2 / (l @ M @ l),
+        frequency=omega / (2 * np.pi),
+        effective_mass=effective_masses(structure.M, shape, l) / total,
         shape=shape,
     )

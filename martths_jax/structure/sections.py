@@ -38,17 +38,18 @@ class Section:
     Attributes:
         A: area [m^2]; zero for beams, whose axial force the rigid diaphragm carries.
         I: second moment of area [m^4].
-        A_s: shear area [m^2].
+        A_s: shear area [m^2]; infinite, the default, for a member that does not shear.
     """
 
     A: float
     I: float
-    A_s: float
+    A_s: float = np.inf
 
     def __post_init__(self):
         check_positive("A", self.A, "m^2", zero=True)
         check_positive("I", self.I, "m^4")
-        check_positive("A_s", self.A_s, "m^2")
+        if not (isinstance(self.A_s, float) and self.A_s == np.inf):
+            check_positive("A_s", self.A_s, "m^2")
 
     @classmethod
     def from_inches(cls, A: float, I: float, A_s: float) -> Section:

@@ -5,6 +5,7 @@ import pytest
 from scipy import linalg
 
 from martths_jax import Quirks, published
+from martths_jax.structure.damping import rayleigh_coefficients
 from martths_jax.structure.experimental import (
     condensation,
     ideal_frame,
@@ -17,7 +18,6 @@ from martths_jax.structure.frame import (
     build_reference,
     diaphragm_map,
     modes,
-    rayleigh_coefficients,
 )
 from martths_jax.structure.sections import FrameGeometry
 
