@@ -1,15 +1,35 @@
 """Controllers, one file each with its ``ENTRY``; ``ENTRIES`` lists them."""
 
 from martths_jax.control.base import Controller, Decision, Observation
-from martths_jax.control.controllers import adfc, lqg, passthrough
+from martths_jax.control.controllers import (
+    adfc,
+    derivative_ff,
+    inverse,
+    lqg,
+    passthrough,
+    phase_lead,
+    polynomial,
+)
 from martths_jax.control.controllers.adfc import ADFC
+from martths_jax.control.controllers.derivative_ff import DerivativeFeedforward
 from martths_jax.control.controllers.feedforward import AdaptiveFeedforward
 from martths_jax.control.controllers.frozen import FrozenFeedforward
+from martths_jax.control.controllers.inverse import Inverse
 from martths_jax.control.controllers.lqg import LQG
 from martths_jax.control.controllers.passthrough import Passthrough
+from martths_jax.control.controllers.phase_lead import PhaseLead
+from martths_jax.control.controllers.polynomial import Polynomial
 
 #: What can be named without a path, in the order of help texts.
-ENTRIES = (lqg.ENTRY, adfc.ENTRY, passthrough.ENTRY)
+ENTRIES = (
+    lqg.ENTRY,
+    adfc.ENTRY,
+    passthrough.ENTRY,
+    polynomial.ENTRY,
+    phase_lead.ENTRY,
+    derivative_ff.ENTRY,
+    inverse.ENTRY,
+)
 
 __all__ = [
     "ADFC",
@@ -18,7 +38,11 @@ __all__ = [
     "AdaptiveFeedforward",
     "Controller",
     "Decision",
+    "DerivativeFeedforward",
     "FrozenFeedforward",
+    "Inverse",
     "Observation",
     "Passthrough",
+    "PhaseLead",
+    "Polynomial",
 ]

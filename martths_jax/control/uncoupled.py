@@ -1,0 +1,85 @@
+"""What compensators of one actuator by itself have in common: numbers of an entry, and a filter.
+
+Such a compensator has a field for each parameter of its entry, ``name_1`` and ``name_2`` where the
+actuators differ, and commands u_i from x_a,i alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from types import MappingProxyType
+
+import jax.numpy as jnp
+import numpy as np
+
+from martths_jax.control.adaptive.arguments import known
+from martths_jax.control.base import Controller
+from martths_jax.control.entry import Entry, Parameter
+from martths_jax.control.estimators import DirectMeasurement, design_kalman
+from martths_jax.errors import argument_error
+
+#: What the strokes are estimated with: the Kalman filter on the nominal plant, or nothing.
+ESTIMATES = ("kalman", "measured")
+#: Parameters of every such compensator; the noise is that of the other controllers' filter.
+FILTER = (
+    Parameter("q", "q", "process noise", 3e-5, "mm^2", 0.0, above=True),
+    Parameter("estimate", "", "strokes that are handed on", "kalman", choices=ESTIMATES,
+              kind="static"),
+)  # fmt: skip
+
+
+def numbers(*names: str) -> MappingProxyType:
+    """``Controller.shared_axes`` of fields that are one number, or one a trial; q is one."""
+    return MappingProxyType(dict.fromkeys((*names, "q"), 0))
+
+
+def both(text: str) -> tuple[str, str]:
+    """The names of a field that each actuator has its own of."""
+    return f"{text}_1", f"{text}_2"
+
+
+def out_of_range(controller: Controller, entry: Entry) -> list[str]:
+    """Sentences about fields that their entry does not allow; what is traced has no value yet."""
+    found = []
+    for p in entry.parameters:
+        value = getattr(controller, p.name)
+        given = known(value)
+        if given is None:
+            good = value is not None or p.default is None
+        elif p.is_number and given.dtype != object:
+            good = given.ndim < 2 and all(map(p.good, given.ravel().tolist()))
+        else:
+            good = p.good(value)
+        if not good:
+            found.append(str(argument_error(p.name, p.wanted, f"{value!r:.80}")))
+    return found
+
+
+def as_arrays(controller: Controller, names: Iterable[str]) -> Controller:
+    """The controller with some fields as float64 arrays, as the loop wants them."""
+    return replace(controller, **{n: jnp.asarray(getattr(controller, n), float) for n in names})
+
+
+def ready(controller: Controller, benchmark) -> Controller:
+    """The controller with its filter, and with its numbers as arrays.
+
+    Args:
+        controller: with fields `q` [mm^2], `estimate` (of ``ESTIMATES``) and `estimator`.
+        benchmark: gives the nominal plant and the sensor noise.
+    """
+    made = as_arrays(controller, controller.shared_axes)
+    if controller.estimate == "measured":
+        return replace(made, estimator=DirectMeasurement())
+    filtered = design_kalman(benchmark.plant_model, controller.q, benchmark.r_mm2)
+    return replace(made, estimator=filtered)
+
+
+def per_actuator(controller: Controller, name: str) -> tuple:
+    """The two values of a field that each actuator has its own of."""
+    return tuple(getattr(controller, one) for one in both(name))
+
+
+def whole_samples(seconds: float, fs: float) -> int:
+    """A static time as samples, to the nearest."""
+    return int(np.floor(seconds * fs + 0.5))
