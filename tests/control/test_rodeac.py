@@ -62,6 +62,7 @@ def test_taps_and_command_solve_both_equations():
     np.testing.assert_allclose(new, expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_paired_with_the_command_before_it_is_a_choice_of_pieces(benchmark):
     pieces = AdaptiveFeedforward(
         fir(4), Recursive(prior(), 0.9995), start=START, joint=False, learns_from="measurement",
@@ -75,6 +76,7 @@ def test_paired_with_the_command_before_it_is_a_choice_of_pieces(benchmark):
         np.testing.assert_array_equal(one.signals[name], other.signals[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pairing", ["same", "previous"])
 def test_numbers_may_differ_from_trial_to_trial(benchmark, pairing):
     plants, scales, mu = draw_plants(2, seed=1), np.array([1e-3, 1.0]), np.array([1.0, 0.999])
