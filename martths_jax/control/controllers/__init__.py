@@ -6,9 +6,11 @@ from martths_jax.control.controllers import (
     derivative_ff,
     inverse,
     lqg,
+    mff,
     passthrough,
     phase_lead,
     polynomial,
+    rodeac,
 )
 from martths_jax.control.controllers.adfc import ADFC
 from martths_jax.control.controllers.derivative_ff import DerivativeFeedforward
@@ -16,9 +18,11 @@ from martths_jax.control.controllers.feedforward import AdaptiveFeedforward
 from martths_jax.control.controllers.frozen import FrozenFeedforward
 from martths_jax.control.controllers.inverse import Inverse
 from martths_jax.control.controllers.lqg import LQG
+from martths_jax.control.controllers.mff import MFF
 from martths_jax.control.controllers.passthrough import Passthrough
 from martths_jax.control.controllers.phase_lead import PhaseLead
 from martths_jax.control.controllers.polynomial import Polynomial
+from martths_jax.control.controllers.rodeac import RoDeAC
 
 #: What can be named without a path, in the order of help texts.
 ENTRIES = (
@@ -29,12 +33,15 @@ ENTRIES = (
     phase_lead.ENTRY,
     derivative_ff.ENTRY,
     inverse.ENTRY,
+    mff.ENTRY,
+    rodeac.ENTRY,
 )
 
 __all__ = [
     "ADFC",
     "ENTRIES",
     "LQG",
+    "MFF",
     "AdaptiveFeedforward",
     "Controller",
     "Decision",
@@ -45,4 +52,5 @@ __all__ = [
     "Passthrough",
     "PhaseLead",
     "Polynomial",
+    "RoDeAC",
 ]
