@@ -34,6 +34,9 @@ class Relation:
     terms: Mapping[str, float]
 
     def __post_init__(self):
+        if not isinstance(self.follower, str):
+            wanted = "be the name of a degree of freedom"
+            raise argument_error("follower", wanted, repr(self.follower)[:80])
         if not isinstance(self.terms, Mapping) or not self.terms:
             wanted = "map names of degrees of freedom to coefficients"
             raise argument_error("terms", wanted, repr(self.terms)[:80])

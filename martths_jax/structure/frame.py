@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from martths_jax.structure.assembly import DIRECTIONS, FIXED, PINNED, PlanarFrame, free_matrices
+from martths_jax.structure.assembly import free_matrices
 from martths_jax.structure.constraints import Relation, diaphragm, resolve
 from martths_jax.structure.damping import rayleigh_coefficients
 from martths_jax.structure.members import Material, Member, Node
 from martths_jax.structure.modes import effective_masses, massive, natural_modes
+from martths_jax.structure.planar import DIRECTIONS, FIXED, PINNED, PlanarFrame
 from martths_jax.structure.sections import FrameGeometry
 
 N_DOF = 38

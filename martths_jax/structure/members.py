@@ -99,10 +99,18 @@ class Member:
         check_positive("rigid_start", self.rigid_start, "m", zero=True)
         check_positive("rigid_end", self.rigid_end, "m", zero=True)
         check_positive("carried", self.carried, "kg/m", zero=True)
-        if isinstance(self.release, str) or not set(self.release) <= set(ENDS):
-            raise argument_error("release", "hold no other words than start, end", self.release)
+        for name in ("start", "end", "section", "material"):
+            if not isinstance(getattr(self, name), str):
+                raise argument_error(name, "be a name", repr(getattr(self, name))[:80])
+        words = self.release if isinstance(self.release, (tuple, list)) else [None]
+        if not all(word in ENDS for word in words):
+            wanted = "be a list of no other words than start, end"
+            raise argument_error("release", wanted, repr(self.release)[:80])
         if self.mass not in MASSES:
-            raise argument_error("mass", f"be one of {', '.join(MASSES)}", repr(self.mass))
+            raise argument_error("mass", f"be one of {', '.join(MASSES)}", repr(self.mass)[:80])
+        if not isinstance(self.rotatory, bool) or not isinstance(self.rigid_axially, bool):
+            name = "rigid_axially" if isinstance(self.rotatory, bool) else "rotatory"
+            raise argument_error(name, "be True or False", repr(getattr(self, name))[:80])
 
 
 def bending_stiffness(section: Section, length: float, E: float, G: float) -> np.ndarray:

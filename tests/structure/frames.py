@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from martths_jax.structure.assembly import FIXED, PlanarFrame
 from martths_jax.structure.constraints import diaphragm
 from martths_jax.structure.members import Material, Member, Node
+from martths_jax.structure.planar import FIXED, PlanarFrame
 from martths_jax.structure.sections import Section
 
 STEEL = Material(E=210e9, G=81e9, density=7850.0)

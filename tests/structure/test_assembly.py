@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from martths_jax.structure.assembly import FIXED, assemble, free_matrices
+from martths_jax.structure.assembly import assemble, free_matrices
 from martths_jax.structure.constraints import diaphragm
 from martths_jax.structure.members import Member
+from martths_jax.structure.planar import FIXED
 from tests.structure.frames import SLENDER, STEEL, frame, two_storeys
 
 

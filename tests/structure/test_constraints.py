@@ -159,3 +159,10 @@ def test_a_rigid_link_is_a_member_that_does_not_give():
         off.append(abs(displacement(assemble(built), load, "2.y") / rigid - 1))
     assert off[1] < 1e-4
     assert off[0] / off[1] == pytest.approx(100, rel=0.05)
+
+
+def test_a_relation_may_name_its_follower_again():
+    """a = a / 2 + b is a = 2 b."""
+    T, kept = resolve((Relation("a", {"a": 0.5, "b": 1.0}),), ("a", "b"))
+    assert kept == ("b",)
+    np.testing.assert_array_equal(T, [[2.0], [1.0]])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from martths_jax.structure.assembly import FIXED, assemble, free_matrices
+from martths_jax.structure.assembly import assemble, free_matrices
 from martths_jax.structure.members import (
     Member,
     Node,
@@ -13,6 +13,7 @@ from martths_jax.structure.members import (
     bending_stiffness,
     member_matrices,
 )
+from martths_jax.structure.planar import FIXED
 from tests.structure.frames import (
     SLENDER,
     STEEL,
@@ -152,3 +153,15 @@ def test_a_support_takes_its_rows_out():
     names, K, _ = free_matrices(beam(L, 1, {"0": FIXED}))
     assert names == ("1.x", "1.y", "1.rotation")
     np.testing.assert_array_equal(K, matrices(material=WEIGHTLESS)[0][3:, 3:])
+
+
+def test_rigid_ends_move_as_the_nodes_or_stretch():
+    """Mass along the member: m L / 3 at a node, or m (a + l / 3) beside a rigid end of a."""
+    a, b = 0.2, 0.35
+    m, more = STEEL.density * STOUT.A, {"rigid_start": a, "rigid_end": b, "mass": "consistent"}
+    _, M = matrices(**more)
+    np.testing.assert_allclose(M[[0, 0, 3], [0, 3, 3]], m * L / np.array([3, 6, 3]), rtol=1e-12)
+    _, M = matrices(**more, rigid_axially=True)
+    l = L - a - b
+    expected = m * np.array([a + l / 3, l / 6, b + l / 3])
+    np.testing.assert_allclose(M[[0, 0, 3], [0, 3, 3]], expected, rtol=1e-12)

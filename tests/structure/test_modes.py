@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from martths_jax.structure.assembly import FIXED, assemble
+from martths_jax.structure.assembly import assemble
 from martths_jax.structure.constraints import Relation, rigid_link
 from martths_jax.structure.members import Material
 from martths_jax.structure.modes import condense, effective_masses, natural_modes
+from martths_jax.structure.planar import FIXED
 from tests.structure.frames import SLENDER, STEEL, STOUT, beam, two_storeys
 
 WAYS = ("x", "y", (1.0, 1.0), (-0.28, 0.96))
