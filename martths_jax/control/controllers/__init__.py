@@ -9,6 +9,8 @@ from martths_jax.control.controllers import (
     passthrough,
     phase_lead,
     polynomial,
+    polynomial_darby,
+    polynomial_wallace,
 )
 from martths_jax.control.controllers.adfc import ADFC
 from martths_jax.control.controllers.derivative_ff import DerivativeFeedforward
@@ -19,6 +21,8 @@ from martths_jax.control.controllers.lqg import LQG
 from martths_jax.control.controllers.passthrough import Passthrough
 from martths_jax.control.controllers.phase_lead import PhaseLead
 from martths_jax.control.controllers.polynomial import Polynomial
+from martths_jax.control.controllers.polynomial_darby import PolynomialDarby
+from martths_jax.control.controllers.polynomial_wallace import PolynomialWallace
 
 #: What can be named without a path, in the order of help texts.
 ENTRIES = (
@@ -29,6 +33,8 @@ ENTRIES = (
     phase_lead.ENTRY,
     derivative_ff.ENTRY,
     inverse.ENTRY,
+    polynomial_wallace.ENTRY,
+    polynomial_darby.ENTRY,
 )
 
 __all__ = [
@@ -45,4 +51,6 @@ __all__ = [
     "Passthrough",
     "PhaseLead",
     "Polynomial",
+    "PolynomialDarby",
+    "PolynomialWallace",
 ]
