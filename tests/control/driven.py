@@ -24,6 +24,22 @@ def driven(controller, benchmark, x_a, x_hat=None):
     return jax.tree.map(np.asarray, jax.lax.scan(step, controller.init(x_a.shape[2]), series)[1])
 
 
+def late_rig(controller, benchmark, x_a, delays, size=1.0):
+    """Strokes and delays (N, 2) of a rig: stroke i is `size` of the command so long ago."""
+    dt, line = jnp.asarray(benchmark.dt), jnp.zeros((max(delays), 2))
+
+    def step(carry, given):
+        state, line = carry
+        k, target = given
+        x = size * jnp.stack([line[d - 1, i] for i, d in enumerate(delays)])[:, None]
+        state, said = controller.step(state, Observation(k, dt, target[:, None], x, x, (), None))
+        line = jnp.concatenate([said.u.T, line[:-1]])
+        return (state, line), (x[:, 0], said.signals["tau"][:, 0])
+
+    series = jnp.arange(len(x_a)), jnp.asarray(x_a)
+    return [np.asarray(a) for a in jax.lax.scan(step, (controller.init(1), line), series)[1]]
+
+
 def strokes(samples=300, trials=3, seed=5):
     """Smooth strokes (N, 2, T) [mm] that do not start at rest, as little as that matters."""
     rng = np.random.default_rng(seed)

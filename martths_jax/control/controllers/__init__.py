@@ -10,6 +10,8 @@ from martths_jax.control.controllers import (
     passthrough,
     phase_lead,
     polynomial,
+    polynomial_darby,
+    polynomial_wallace,
     rodeac,
 )
 from martths_jax.control.controllers.adfc import ADFC
@@ -22,6 +24,8 @@ from martths_jax.control.controllers.mff import MFF
 from martths_jax.control.controllers.passthrough import Passthrough
 from martths_jax.control.controllers.phase_lead import PhaseLead
 from martths_jax.control.controllers.polynomial import Polynomial
+from martths_jax.control.controllers.polynomial_darby import PolynomialDarby
+from martths_jax.control.controllers.polynomial_wallace import PolynomialWallace
 from martths_jax.control.controllers.rodeac import RoDeAC
 
 #: What can be named without a path, in the order of help texts.
@@ -35,6 +39,8 @@ ENTRIES = (
     inverse.ENTRY,
     mff.ENTRY,
     rodeac.ENTRY,
+    polynomial_wallace.ENTRY,
+    polynomial_darby.ENTRY,
 )
 
 __all__ = [
@@ -52,5 +58,7 @@ __all__ = [
     "Passthrough",
     "PhaseLead",
     "Polynomial",
+    "PolynomialDarby",
+    "PolynomialWallace",
     "RoDeAC",
 ]
