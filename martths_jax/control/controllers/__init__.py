@@ -1,7 +1,12 @@
 """Controllers, one file each with its ``ENTRY``; ``ENTRIES`` lists them."""
 
 from martths_jax.control.base import Controller, Decision, Observation
-from martths_jax.control.controllers import adfc, lqg, passthrough
+from martths_jax.control.controllers import (
+    adfc,
+    ats,
+    lqg,
+    passthrough,
+)
 from martths_jax.control.controllers.adfc import ADFC
 from martths_jax.control.controllers.feedforward import AdaptiveFeedforward
 from martths_jax.control.controllers.frozen import FrozenFeedforward
@@ -9,7 +14,7 @@ from martths_jax.control.controllers.lqg import LQG
 from martths_jax.control.controllers.passthrough import Passthrough
 
 #: What can be named without a path, in the order of help texts.
-ENTRIES = (lqg.ENTRY, adfc.ENTRY, passthrough.ENTRY)
+ENTRIES = (lqg.ENTRY, adfc.ENTRY, passthrough.ENTRY, ats.ENTRY)
 
 __all__ = [
     "ADFC",
