@@ -16,7 +16,10 @@ from martths_jax import (
 )
 
 NAMES = ("J2true_1", "J2true_2")
-MODULES = ("ats",)
+MODULES = (
+    "ats",
+    "ats_rls",
+)
 
 
 @pytest.fixture(scope="module")
