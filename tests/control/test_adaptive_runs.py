@@ -19,6 +19,7 @@ NAMES = ("J2true_1", "J2true_2")
 MODULES = (
     "ats",
     "ats_rls",
+    "aic",
 )
 
 

@@ -3,6 +3,7 @@
 from martths_jax.control.base import Controller, Decision, Observation
 from martths_jax.control.controllers import (
     adfc,
+    aic,
     ats,
     ats_rls,
     lqg,
@@ -15,7 +16,7 @@ from martths_jax.control.controllers.lqg import LQG
 from martths_jax.control.controllers.passthrough import Passthrough
 
 #: What can be named without a path, in the order of help texts.
-ENTRIES = (lqg.ENTRY, adfc.ENTRY, passthrough.ENTRY, ats.ENTRY, ats_rls.ENTRY)
+ENTRIES = (lqg.ENTRY, adfc.ENTRY, passthrough.ENTRY, ats.ENTRY, ats_rls.ENTRY, aic.ENTRY)
 
 __all__ = [
     "ADFC",
