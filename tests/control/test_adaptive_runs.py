@@ -20,6 +20,7 @@ MODULES = (
     "ats",
     "ats_rls",
     "aic",
+    "error_model",
 )
 
 

@@ -6,6 +6,7 @@ from martths_jax.control.controllers import (
     aic,
     ats,
     ats_rls,
+    error_model,
     lqg,
     passthrough,
 )
@@ -16,7 +17,15 @@ from martths_jax.control.controllers.lqg import LQG
 from martths_jax.control.controllers.passthrough import Passthrough
 
 #: What can be named without a path, in the order of help texts.
-ENTRIES = (lqg.ENTRY, adfc.ENTRY, passthrough.ENTRY, ats.ENTRY, ats_rls.ENTRY, aic.ENTRY)
+ENTRIES = (
+    lqg.ENTRY,
+    adfc.ENTRY,
+    passthrough.ENTRY,
+    ats.ENTRY,
+    ats_rls.ENTRY,
+    aic.ENTRY,
+    error_model.ENTRY,
+)
 
 __all__ = [
     "ADFC",
