@@ -21,6 +21,7 @@ MODULES = (
     "ats_rls",
     "aic",
     "error_model",
+    "adfc_rls",
 )
 
 

@@ -3,6 +3,7 @@
 from martths_jax.control.base import Controller, Decision, Observation
 from martths_jax.control.controllers import (
     adfc,
+    adfc_rls,
     aic,
     ats,
     ats_rls,
@@ -25,6 +26,7 @@ ENTRIES = (
     ats_rls.ENTRY,
     aic.ENTRY,
     error_model.ENTRY,
+    adfc_rls.ENTRY,
 )
 
 __all__ = [
