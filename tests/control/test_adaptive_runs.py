@@ -22,6 +22,7 @@ MODULES = (
     "aic",
     "error_model",
     "adfc_rls",
+    "adfc_weighted",
 )
 
 

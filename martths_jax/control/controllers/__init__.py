@@ -4,6 +4,7 @@ from martths_jax.control.base import Controller, Decision, Observation
 from martths_jax.control.controllers import (
     adfc,
     adfc_rls,
+    adfc_weighted,
     aic,
     ats,
     ats_rls,
@@ -27,6 +28,7 @@ ENTRIES = (
     aic.ENTRY,
     error_model.ENTRY,
     adfc_rls.ENTRY,
+    adfc_weighted.ENTRY,
 )
 
 __all__ = [
