@@ -20,6 +20,7 @@ from martths_jax.control.adaptive.law import Linear
 from martths_jax.control.adaptive.lowpass import LowPass, butterworth
 from martths_jax.control.adaptive.recursive import RandomWalk, Recursive
 from martths_jax.control.adaptive.taps import TapMap, fir
+from martths_jax.control.adaptive.weighted import WeightedWindow
 from martths_jax.control.adaptive.window import Window
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "Regressor",
     "ShapedPull",
     "TapMap",
+    "WeightedWindow",
     "Window",
     "butterworth",
     "fir",

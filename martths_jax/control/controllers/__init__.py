@@ -1,13 +1,20 @@
 """Controllers, one file each with its ``ENTRY``; ``ENTRIES`` lists them."""
 
 from martths_jax.control.base import Controller, Decision, Observation
-<<<<<<< HEAD
 from martths_jax.control.controllers import (
     adfc,
+    adfc_rls,
+    adfc_weighted,
+    aic,
+    ats,
+    ats_rls,
+    decoupling,
     derivative_ff,
+    error_model,
     inverse,
     lqg,
     mff,
+    mff_lqg,
     passthrough,
     phase_lead,
     polynomial,
@@ -16,12 +23,14 @@ from martths_jax.control.controllers import (
     rodeac,
 )
 from martths_jax.control.controllers.adfc import ADFC
-from martths_jax.control.controllers.derivative_ff import DerivativeFeedforward
-=======
-from martths_jax.control.controllers import adfc, decoupling, lqg, mff, mff_lqg, passthrough, rodeac
-from martths_jax.control.controllers.adfc import ADFC
+from martths_jax.control.controllers.adfc_rls import RecursiveADFC
+from martths_jax.control.controllers.adfc_weighted import WeightedADFC
+from martths_jax.control.controllers.aic import AIC
+from martths_jax.control.controllers.ats import ATS
+from martths_jax.control.controllers.ats_rls import RecursiveATS
 from martths_jax.control.controllers.decoupling import Decoupling
->>>>>>> fam-d
+from martths_jax.control.controllers.derivative_ff import DerivativeFeedforward
+from martths_jax.control.controllers.error_model import ErrorModel
 from martths_jax.control.controllers.feedforward import AdaptiveFeedforward
 from martths_jax.control.controllers.frozen import FrozenFeedforward
 from martths_jax.control.controllers.inverse import Inverse
@@ -40,25 +49,28 @@ ENTRIES = (
     lqg.ENTRY,
     adfc.ENTRY,
     passthrough.ENTRY,
-<<<<<<< HEAD
     polynomial.ENTRY,
+    polynomial_wallace.ENTRY,
+    polynomial_darby.ENTRY,
     phase_lead.ENTRY,
     derivative_ff.ENTRY,
     inverse.ENTRY,
-    mff.ENTRY,
-    rodeac.ENTRY,
-    polynomial_wallace.ENTRY,
-    polynomial_darby.ENTRY,
-=======
-    rodeac.ENTRY,
+    aic.ENTRY,
     mff.ENTRY,
     mff_lqg.ENTRY,
     decoupling.ENTRY,
->>>>>>> fam-d
+    ats.ENTRY,
+    ats_rls.ENTRY,
+    rodeac.ENTRY,
+    error_model.ENTRY,
+    adfc_rls.ENTRY,
+    adfc_weighted.ENTRY,
 )
 
 __all__ = [
     "ADFC",
+    "AIC",
+    "ATS",
     "ENTRIES",
     "LQG",
     "MFF",
@@ -66,11 +78,9 @@ __all__ = [
     "AdaptiveFeedforward",
     "Controller",
     "Decision",
-<<<<<<< HEAD
-    "DerivativeFeedforward",
-=======
     "Decoupling",
->>>>>>> fam-d
+    "DerivativeFeedforward",
+    "ErrorModel",
     "FrozenFeedforward",
     "Inverse",
     "Observation",
@@ -79,5 +89,8 @@ __all__ = [
     "Polynomial",
     "PolynomialDarby",
     "PolynomialWallace",
+    "RecursiveADFC",
+    "RecursiveATS",
     "RoDeAC",
+    "WeightedADFC",
 ]
