@@ -8,6 +8,7 @@ value of each of its axes.  Nothing else of a page's code is changed.
 from __future__ import annotations
 
 import ast
+import csv
 import re
 from dataclasses import replace
 from functools import cache
@@ -187,3 +188,17 @@ def test_options_in_the_text_exist(page):
 def test_figures_are_not_drawn_on_a_screen():
     """Code of the pages may draw; it must not open windows."""
     assert matplotlib.get_backend().lower() in ("agg", "pdf", "svg")
+
+
+def test_the_table_of_descents_is_the_committed_run():
+    path = ROOT / "experiments" / "tune_lqg" / "results" / "descents.csv"
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = {(r["objective"], r["method"]): r for r in csv.DictReader(file)}
+    page = (ROOT / "docs" / "tuning.md").read_text("utf-8").replace("**", "")
+    for text in dict.fromkeys(objective for objective, _ in rows):
+        shown = text.replace("*", " ").replace("j", "J").replace("+", " + ")
+        cells = [f"{float(rows[text, 'lbfgs']['after 1']):.2f}"]
+        for method in ("lbfgs", "scipy", "adam"):
+            best = [float(rows[text, method][f"after {n}"]) for n in (11, 31, 61)]
+            cells.append(", ".join(f"{value:.2f}" for value in best))
+        assert f"| {shown} | {' | '.join(cells)} |" in page, (shown, cells)
