@@ -26,7 +26,7 @@ def test_it_is_the_bilinear_transform_of_a_lead(benchmark):
 
 
 def test_slow_motion_is_led_by_tau_and_scaled_by_the_gain(benchmark):
-    """A ramp of slope 1 comes out as g (t + tau), once the pole of 3 ms has died away."""
+    """A ramp of slope 1 comes out as g (t + tau), once the pole of 1 ms has died away."""
     t = np.arange(600) / benchmark.fs
     ramp = np.broadcast_to(t[:, None, None], (600, 2, 1))
     u, _ = driven(PhaseLead().prepare(benchmark), benchmark, ramp)

@@ -75,6 +75,15 @@ def test_rest_moves_nothing_and_is_no_nan(benchmark):
     assert np.all(signals["rho"] == 1.0)
 
 
+def test_a_crawl_below_the_floor_moves_nothing(benchmark):
+    """At 0.25 mm/s, under 0.3 of the least rms velocity of 1 mm/s, the error is noise."""
+    crawl = np.broadcast_to(0.25 * np.arange(400)[:, None, None] / 1024, (400, 2, 1))
+    for speed, moves in ((1.0, False), (1.4, True)):
+        still = PolynomialWallace(gain_rate=0.0).prepare(benchmark)
+        _, signals = driven(still, benchmark, speed * crawl, 0 * crawl)
+        assert np.ptp(signals["tau"][50:], axis=0).any() == moves
+
+
 def test_the_loop_is_stable_where_it_starts(benchmark):
     own = PolynomialWallace()
     start = own.frozen(benchmark, np.array([own.tau_1, own.tau_2]))

@@ -91,7 +91,7 @@ ENTRY = Entry(
     label="Polynomial, Wallace",
     paper="Wallace, Wagg & Neild 2005, adaptive polynomial forward prediction",
     parameters=(
-        # Of 14 choices on 32 drawn plants, the one with the least error of the slower actuator.
+        # Of 13 choices on 32 drawn plants and elcentro-like, the best for the slower actuator.
         Parameter("rate", "r_tau", "rate of the delay", 5.0, "1/s", 0.0, 30.0, kind="tunable"),
         Parameter("gain_rate", "r_rho", "rate of the gain", 10.0, "1/s", 0.0, 30.0, kind="tunable"),
         *parameters(2, 8, 4 / 1024, (40 / 1024, 26 / 1024)),
