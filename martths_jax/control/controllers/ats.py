@@ -32,7 +32,7 @@ from martths_jax.control.adaptive.lowpass import butterworth
 from martths_jax.control.adaptive.weighted import WeightedWindow
 from martths_jax.control.controllers.feedforward import AdaptiveFeedforward
 from martths_jax.control.entry import Entry, Parameter
-from martths_jax.errors import InputError, argument_error
+from martths_jax.errors import argument_error
 
 ORDER = 2
 REGRESSOR = BackwardDifferences(order=ORDER, accuracy=2)
@@ -102,8 +102,8 @@ class ATS(AdaptiveFeedforward):
                 the measured strokes [mm^2].
 
         Raises:
-            InputError: an unknown preset, a window with fewer pairs than a fit needs or that
-                `every` does not divide, or a cutoff at or beyond half the sampling rate.
+            InputError: an unknown preset, a window with fewer pairs than a fit needs, or a
+                cutoff at or beyond half the sampling rate.
         """
         if preset not in PRESETS:
             raise argument_error("preset", f"be one of {', '.join(PRESETS)}", repr(preset))
@@ -142,10 +142,10 @@ def start_from(fs: float, delay) -> jax.Array:
 
 
 def window_samples(fs: float, window: float, every: int) -> tuple[int, int]:
-    """Samples N_b of a window [s] and `every`, both whole.
+    """Samples N_b of a window [s], cut to a multiple of `every`, and `every`, both whole.
 
     Raises:
-        InputError: fewer pairs than unknowns + 1; or `every` is no whole divisor of N_b.
+        InputError: fewer pairs than unknowns + 1.
     """
     nb, every = round(fs * window), int(every)
     least = ORDER + 2
@@ -167,10 +167,8 @@ def check_cutoff(fs: float, cutoff: float) -> None:
         InputError: at or beyond half the sampling rate.
     """
     if not 0 < cutoff < fs / 2:
-        raise InputError(
-            str(argument_error("cutoff", f"lie between 0 and {fs / 2:g} Hz, half the sampling "
-                               "rate", f"{cutoff:g}"))
-        )  # fmt: skip
+        wanted = f"lie between 0 and {fs / 2:g} Hz, half the sampling rate"
+        raise argument_error("cutoff", wanted, f"{cutoff:g}")
 
 
 ENTRY = Entry(
