@@ -105,8 +105,9 @@ class Decoupling(Controller):
         )
 
     def init(self, trials):
-        """Memory of the signals that D and that the compensators take."""
-        return VALUE_AND_SLOPE.init(trials), VALUE_AND_SLOPE.init(trials)
+        """Memory of the signals that D takes, where it has slopes, and that the compensators take."""
+        first = VALUE_AND_SLOPE.init(trials) if self.form == "dynamic" else ()
+        return first, VALUE_AND_SLOPE.init(trials)
 
     def step(self, state, seen):
         first, second = state
