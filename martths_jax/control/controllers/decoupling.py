@@ -105,7 +105,7 @@ class Decoupling(Controller):
         )
 
     def init(self, trials):
-        """Memory of the signals that D takes, where it has slopes, and that the compensators take."""
+        """Memory of what D takes, where it has slopes, and of what the compensators take."""
         first = VALUE_AND_SLOPE.init(trials) if self.form == "dynamic" else ()
         return first, VALUE_AND_SLOPE.init(trials)
 
