@@ -28,7 +28,7 @@ def plant(benchmark, f):
 
 def test_static_decoupling_is_the_inverse_at_rest(benchmark):
     A, B, C = benchmark.plant_continuous
-    ready = Decoupling(kind="static", lead_ms=(60.0, 25.0)).prepare(benchmark)
+    ready = Decoupling(form="static", lead_ms=(60.0, 25.0)).prepare(benchmark)
     at_rest = -C @ np.linalg.solve(A, B) @ np.asarray(ready.D[0])
     np.testing.assert_allclose(at_rest, np.eye(2), atol=1e-9)
     assert not np.any(ready.D[1])
@@ -53,13 +53,13 @@ def test_dynamic_decoupling_takes_the_interaction_out(benchmark):
         assert abs(whole[1, i, j]) < 0.35 * abs(H[1, i, j])
 
 
-@pytest.mark.parametrize("kind", ["static", "dynamic"])
-def test_leads_are_least_squares_over_both_inputs(benchmark, kind):
-    ready = Decoupling(kind=kind, band_hz=5.0).prepare(benchmark)
+@pytest.mark.parametrize("form", ["static", "dynamic"])
+def test_leads_are_least_squares_over_both_inputs(benchmark, form):
+    ready = Decoupling(form=form, band_hz=5.0).prepare(benchmark)
     D = np.asarray(ready.D)
     H, s, z = plant(benchmark, np.arange(1, 401) / 80)
     dynamic = D[0] + s[:, None, None] * D[1]
-    channels = D[0] @ H if kind == "static" else H @ dynamic
+    channels = D[0] @ H if form == "static" else H @ dynamic
     difference = np.array([[1, 0, 0], [1.5, -2, 0.5]])
     for i in (0, 1):
         gram, right = 400e-9 * difference @ difference.T, np.zeros(2)
@@ -72,9 +72,9 @@ def test_leads_are_least_squares_over_both_inputs(benchmark, kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["static", "dynamic"])
-def test_the_command_is_what_the_equations_say(benchmark, kind):
-    ours = Decoupling(kind=kind)
+@pytest.mark.parametrize("form", ["static", "dynamic"])
+def test_the_command_is_what_the_equations_say(benchmark, form):
+    ours = Decoupling(form=form)
     signals = simulate(benchmark, ours, draw_plants(1, seed=1), burst(0.3), keep=True).signals
     ready = ours.prepare(benchmark)
     D, lead, x_a = np.asarray(ready.D), np.asarray(ready.lead), signals["x_a"][0]
@@ -84,7 +84,7 @@ def test_the_command_is_what_the_equations_say(benchmark, kind):
         return 1.5 * past[2:] - 2 * past[1:-1] + 0.5 * past[:-2]
 
     compensated = lambda x: lead[0] * x + lead[1] * slope(x)  # noqa: E731
-    if kind == "static":
+    if form == "static":
         expected = compensated(x_a @ D[0].T)
     else:
         v = compensated(x_a)
@@ -93,7 +93,7 @@ def test_the_command_is_what_the_equations_say(benchmark, kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("settings", [{"kind": "static"}, {}, {"band_hz": 3.5}])
+@pytest.mark.parametrize("settings", [{"form": "static"}, {}, {"band_hz": 3.5}])
 def test_the_loop_is_stable(benchmark, settings):
     ready = Decoupling(**settings).prepare(benchmark)
     assert spectral_radius(benchmark, ready, draw_plants(4, seed=1)).max() < 0.9996
@@ -103,7 +103,7 @@ def test_it_tracks_uncertain_plants_better_than_nothing(benchmark):
     plants, motion, names = draw_plants(64, seed=1), burst(2.0), ["J2true_1", "J2true_2"]
     static, dynamic, none = (
         indices(simulate(benchmark, c, plants, motion, indices=names))
-        for c in (Decoupling(kind="static"), Decoupling(), Passthrough())
+        for c in (Decoupling(form="static"), Decoupling(), Passthrough())
     )
     for name in names:  # false for NaN, which a lost trial has
         assert np.all(static[name] < 0.6 * none[name])
@@ -113,7 +113,7 @@ def test_it_tracks_uncertain_plants_better_than_nothing(benchmark):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"kind": "none"}, r"`kind` must be one of \('static', 'dynamic'\)"),
+        ({"form": "none"}, r"`form` must be one of \('static', 'dynamic'\)"),
         ({"band_hz": 512.0}, "`band_hz` must lie above 0 and below half the sampling rate, 512 Hz"),
         ({"band_hz": 3.0}, "`band_hz` must be at least 3.5 Hz with a dynamic decoupling"),
         ({"lead_ms": (1.0, 2.0, 3.0)}, r"`lead_ms` must be two numbers \(ms\)"),

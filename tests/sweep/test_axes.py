@@ -7,6 +7,7 @@ from martths_jax import Entry, InputError, Parameter, Passthrough
 from martths_jax.campaign.config import make_config
 from martths_jax.campaign.lanes import Worlds
 from martths_jax.control import registry
+from martths_jax.control.controllers import ENTRIES
 from martths_jax.control.registry import find
 from martths_jax.sweep import axes, make_sweep, run_sweep
 from martths_jax.sweep.axes import axis_values as values_of
@@ -148,6 +149,10 @@ def test_every_scalar_sets_something_known():
     own = {p.name for entry in registry.ENTRIES for p in entry.parameters if p.is_number}
     assert {"nb", "no", "pull", "q"} <= own and not own & study
     assert {s.setting for s in scalars().values()} == study | own
+    numbers = {p.name for entry in ENTRIES for p in entry.parameters if p.is_number}
+    worlds = {"scale", "fs", "spread", "noise_power", "alpha", "arm"}
+    assert {"nb", "no", "pull", "q"} <= numbers
+    assert {s.setting for s in scalars().values()} == numbers | worlds
 
 
 def test_cells_keep_what_the_study_makes_the_force_from():

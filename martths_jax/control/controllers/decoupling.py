@@ -32,7 +32,7 @@ from martths_jax.control.estimators import design_kalman
 from martths_jax.structure.modal import ModalSystem, contract, to_dense
 
 #: How D is realised.
-KINDS = ("static", "dynamic")
+FORMS = ("static", "dynamic")
 #: Value and slope of a signal, of second order.
 VALUE_AND_SLOPE = BackwardDifferences(order=1, accuracy=2)
 #: Up to where is fitted [Hz], and how far down a dynamic fit may go: the second derivatives that
@@ -48,7 +48,7 @@ class Decoupling(Controller):
     """The equations above; derivatives are backward differences of second order.
 
     Attributes:
-        kind: ``static`` or ``dynamic``.
+        form: ``static`` or ``dynamic``.
         band_hz: what is fitted, is fitted up to here [Hz].
         lead_ms: (2,) leads T_i of compensators with gain one [ms]; None fits gain and lead of each
             to the inverse of its own channel, see ``channel_leads``.
@@ -58,7 +58,7 @@ class Decoupling(Controller):
         estimator: the Kalman filter; the compensators do not use it.
     """
 
-    kind: str = field(default="dynamic", metadata={"static": True})
+    form: str = field(default="dynamic", metadata={"static": True})
     band_hz: jax.Array | float = BAND_HZ
     lead_ms: jax.Array | tuple[float, float] | None = None
     q: jax.Array | float = 3e-5
@@ -71,14 +71,14 @@ class Decoupling(Controller):
 
     def problems(self, benchmark):
         found = [
-            *complaint(self.kind in KINDS, "kind", f"be one of {KINDS}", repr(self.kind)),
+            *complaint(self.form in FORMS, "form", f"be one of {FORMS}", repr(self.form)),
             *check_band("band_hz", self.band_hz, benchmark),
             *check_positive("q", self.q),
         ]
         if not found:
             found += complaint(np.ndim(self.band_hz) == 0, "band_hz", "be one number",
                                f"{self.band_hz!r:.80}")  # fmt: skip
-        if not found and self.kind == "dynamic":
+        if not found and self.form == "dynamic":
             found += complaint(self.band_hz >= LOWEST_HZ, "band_hz",
                                f"be at least {LOWEST_HZ:g} Hz with a dynamic decoupling, whose "
                                "loop is unstable with narrower fits", self.band_hz)  # fmt: skip
@@ -90,7 +90,7 @@ class Decoupling(Controller):
 
     def prepare(self, benchmark):
         model, fs, band = benchmark.plant_model, benchmark.fs, float(self.band_hz)
-        D = decoupler(model, fs, band, dynamic=self.kind == "dynamic")
+        D = decoupler(model, fs, band, dynamic=self.form == "dynamic")
         if self.lead_ms is None:
             lead = jnp.asarray(channel_leads(model, fs, band, D))
         else:
@@ -105,12 +105,13 @@ class Decoupling(Controller):
         )
 
     def init(self, trials):
-        """Memory of the signals that D and that the compensators take."""
-        return VALUE_AND_SLOPE.init(trials), VALUE_AND_SLOPE.init(trials)
+        """Memory of what D takes, where it has slopes, and of what the compensators take."""
+        first = VALUE_AND_SLOPE.init(trials) if self.form == "dynamic" else ()
+        return first, VALUE_AND_SLOPE.init(trials)
 
     def step(self, state, seen):
         first, second = state
-        if self.kind == "static":
+        if self.form == "static":
             second, u = self._compensate(second, contract(self.D[0], seen.x_a))
             return (first, second), Decision(u=u)
         second, v = self._compensate(second, seen.x_a)
@@ -208,7 +209,7 @@ ENTRY = Entry(
     label="Decoupling",
     paper="Najafi & Spencer, decoupled compensation of several actuators",
     parameters=(
-        Parameter("kind", "", "how the interaction is undone", "dynamic", choices=KINDS,
+        Parameter("form", "", "how the interaction is undone", "dynamic", choices=FORMS,
                   kind="static"),
         Parameter("band_hz", "f_b", "band of the fits", BAND_HZ, "Hz", 0.0, above=True),
         Parameter("lead_ms", "T", "leads of compensators of gain one", None, "ms", size=2),
