@@ -21,6 +21,7 @@ import pytest
 import typer
 
 from martths_jax.cli import app
+from martths_jax.control.controllers import ENTRIES
 from martths_jax.motions import load
 from tests.figures import small_study
 
@@ -202,3 +203,18 @@ def test_the_table_of_descents_is_the_committed_run():
             best = [float(rows[text, method][f"after {n}"]) for n in (11, 31, 61)]
             cells.append(", ".join(f"{value:.2f}" for value in best))
         assert f"| {shown} | {' | '.join(cells)} |" in page, (shown, cells)
+
+
+def test_the_table_of_controllers_is_the_committed_run():
+    path = ROOT / "experiments" / "controllers" / "results" / "true_tracking.csv"
+    page = (ROOT / "docs" / "controllers.md").read_text("utf-8")
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["controller"] for row in rows] == [entry.name for entry in ENTRIES]
+    for row in rows:
+        cells = " | ".join(
+            f"{float(row[f'{n}_median']):.1f} ({float(row[f'{n}_largest']):.1f})"
+            for n in ("J2true_1", "J2true_2")
+        )
+        assert f"| `{row['controller']}` | {cells} |" in page, (row["controller"], cells)
+        assert row["lost"] == "0"
