@@ -28,6 +28,7 @@ def batch(rows):
     return {name: jnp.asarray([row[name] for row in rows]) for name in WEIGHTS}
 
 
+@pytest.mark.slow
 def test_same_controller_as_on_the_host(benchmark, design):
     rng = np.random.default_rng(1)
     rows = [START] + [{n: v + rng.uniform(-3, 3) for n, v in START.items()} for _ in range(11)]

@@ -67,6 +67,7 @@ def test_a_delay_far_outside_the_first_range_is_found(benchmark):
     assert found["J1_1"][0] > 20
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("optimised")
 def test_consistent_hybrid_loop_meets_the_reference_at_first_order():
     """Same frame out and in, ideal actuators, no noise: the error is that of one sample's delay."""

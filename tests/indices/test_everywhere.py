@@ -130,6 +130,7 @@ def test_another_set_is_another_study(study, tmp_path):
         run_study(settings(folder, signals=False, indices=("benchmark",)))
 
 
+@pytest.mark.slow
 def test_it_is_replayed_without_its_file(tmp_path):
     """The run has a copy, which it names; a file of another content is another study."""
     motion = short_motion()
