@@ -5,6 +5,7 @@ Loading a file runs its code, so that nothing is loaded but what the user named.
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import importlib
 import importlib.util
@@ -105,6 +106,19 @@ def load(text: str, what: str, ways: str) -> Place:
         raise InputError(
             f"{what} {text!r} cannot be imported: {last_line(error)}.  Give {ways}."
         ) from error
+
+
+def absent(text: str, what: str, name: str, known: list[str]) -> InputError:
+    """The sentence about a name that a place does not hold.
+
+    Args:
+        text, what: as of ``load``.
+        name: that it gives.
+        known: what of the kind is there.
+    """
+    near = difflib.get_close_matches(name, known, n=1) or known
+    hint = f"did you mean {near[0]!r}?" if near else f"it defines no {what.lower()}."
+    return InputError(f"{what} {text!r} names {name!r}, which is not there; {hint}")
 
 
 def _load_file(path: Path, what: str) -> tuple[ModuleType, str]:

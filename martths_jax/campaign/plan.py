@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from martths_jax.benchmark import Benchmark, build_benchmark
-from martths_jax.campaign.config import StudyConfig, unknown_names
+from martths_jax.campaign.config import StudyConfig, plain_value, unknown_names
 from martths_jax.campaign.draws import Draws, make_draws
 from martths_jax.campaign.given import named
 from martths_jax.campaign.sources import code_of, without_source
@@ -67,6 +67,13 @@ class Plan:
                 if one.copy is not None:
                     found[name]["kind"] = one.copy.again(one.table["kind"])
         return found
+
+    @property
+    def index_names(self) -> list[str]:
+        """What names the indices again; those of files by their copies."""
+        places = files_of(self.config.indices)
+        listed = plain_value("indices", self.config.indices)
+        return [places[i].copy.again(i) if i in places else i for i in listed]
 
     @property
     def copies(self) -> list[Copy]:

@@ -11,13 +11,12 @@ import time
 from pathlib import Path
 
 from martths_jax.campaign import provenance
-from martths_jax.campaign.config import as_settings, plain_value
+from martths_jax.campaign.config import as_settings
 from martths_jax.campaign.files import disk_errors, set_aside, write_text
 from martths_jax.campaign.machine import machine_digest, machine_identity
 from martths_jax.campaign.owner import Owner, door
 from martths_jax.campaign.plan import Plan
 from martths_jax.campaign.progress import compile_seconds
-from martths_jax.indices import files_of
 from martths_jax.motions import Motion
 
 #: Where and how a run goes is in provenance.json: the results must not depend on it.
@@ -27,14 +26,13 @@ _NOT_IN_HEADER = ("out", "devices", "memory_gb", "max_failed", "keep", "signals"
 def header(plan: Plan, command_line: str) -> dict:
     """What ``run.json`` says of a run."""
     config = plan.config
-    places, listed = files_of(config.indices), plain_value("indices", config.indices)
     settings = as_settings(config) | {
         "trials": plan.trials,
         "controllers": list(plan.controllers),
         "motions": [m.name for m in plan.motions] if config.motions is None
         else [m.name if isinstance(m, Motion) else m for m in config.motions],
         "controller": plan.tables,
-        "indices": [places[i].copy.again(i) if i in places else i for i in listed],
+        "indices": plan.index_names,
     }  # fmt: skip
     for name in _NOT_IN_HEADER:
         settings.pop(name)

@@ -22,7 +22,7 @@ from martths_jax.control.base import Controller
 from martths_jax.control.controllers import ENTRIES
 from martths_jax.control.entry import Entry, entry_of
 from martths_jax.errors import InputError
-from martths_jax.guests import Copy, is_place, last_line, load
+from martths_jax.guests import Copy, absent, is_place, last_line, load
 
 GROUP = "martths.controllers"
 #: What can be named, to complete "give ...".
@@ -108,9 +108,7 @@ def _entry_in(module: ModuleType, name: str, text: str) -> Entry:
     given = getattr(module, name, None)
     if given is None:
         own = [n for n, x in vars(module).items() if _is_own_class(x, module)]
-        near = difflib.get_close_matches(name, own, n=1) or own
-        hint = f"did you mean {near[0]!r}?" if near else "it defines no controller."
-        raise InputError(f"Controller {text!r} names {name!r}, which is not there; {hint}")
+        raise absent(text, "Controller", name, own)
     if isinstance(given, type) and issubclass(given, Controller):
         return _speaking_for(module, given) or entry_of(given)
     return _as_entry(given, repr(text))

@@ -29,6 +29,24 @@ FILTER = (
 )  # fmt: skip
 
 
+def gain_and_time(
+    i: int, gain: float, name: str, symbol: str, label: str, value: float
+) -> tuple[Parameter, Parameter]:
+    """Parameters of actuator i, both tunable: a gain, and a time of up to 0.2 s.
+
+    Args:
+        i: 1 or 2.
+        gain: default of ``gain_i`` [-].
+        name, symbol, label: of the time, without the actuator; value: its default [s].
+    """
+    return (
+        Parameter(f"gain_{i}", f"g_{i}", f"gain of actuator {i}", gain, "1", 0.0, above=True,
+                  kind="tunable"),
+        Parameter(f"{name}_{i}", f"{symbol}_{i}", f"{label} of actuator {i}", value, "s", 0.0, 0.2,
+                  kind="tunable"),
+    )  # fmt: skip
+
+
 def numbers(*names: str) -> MappingProxyType:
     """``Controller.shared_axes`` of fields that are one number, or one a trial; q is one."""
     return MappingProxyType(dict.fromkeys((*names, "q"), 0))

@@ -16,7 +16,7 @@ import difflib
 from collections.abc import Iterable, Iterator, Sequence
 
 from martths_jax.errors import InputError
-from martths_jax.guests import Place, is_place, load
+from martths_jax.guests import Place, absent, is_place, load
 from martths_jax.indices import benchmark, frequency, tracking, true_stroke
 from martths_jax.indices.base import Index
 
@@ -130,9 +130,7 @@ def _loaded(text: str) -> Iterator[Index]:
             raise InputError(f"File {text} holds no Index; define one, or name a tuple of them.")
     elif not hasattr(place.module, place.name):
         known = [n for n, x in vars(place.module).items() if isinstance(x, Index)]
-        near = difflib.get_close_matches(place.name, known, n=1) or known
-        hint = f"did you mean {near[0]!r}?" if near else "it defines no index."
-        raise InputError(f"Index {text!r} names {place.name!r}, which is not there; {hint}")
+        raise absent(text, "Index", place.name, known)
     else:
         given = getattr(place.module, place.name)
     several = (given,) if isinstance(given, Index) else given

@@ -16,6 +16,7 @@ from martths_jax.control.entry import Entry, Parameter
 from martths_jax.control.uncoupled import (
     FILTER,
     both,
+    gain_and_time,
     numbers,
     out_of_range,
     per_actuator,
@@ -92,12 +93,7 @@ class DerivativeFeedforward(Controller):
 
 def _of_actuator(i: int, tau: float) -> tuple[Parameter, ...]:
     """Parameters of actuator i: the lead that tracks best at order 1 and a gain of one."""
-    return (
-        Parameter(f"gain_{i}", f"g_{i}", f"gain of actuator {i}", 1.0, "1", 0.0, above=True,
-                  kind="tunable"),
-        Parameter(f"tau_{i}", f"tau_{i}", f"lead of actuator {i}", tau, "s", 0.0, 0.2,
-                  kind="tunable"),
-    )  # fmt: skip
+    return gain_and_time(i, 1.0, "tau", "tau", "lead", tau)
 
 
 ENTRY = Entry(

@@ -13,6 +13,7 @@ from martths_jax.control.entry import Entry, Parameter
 from martths_jax.control.uncoupled import (
     FILTER,
     both,
+    gain_and_time,
     numbers,
     out_of_range,
     per_actuator,
@@ -75,12 +76,7 @@ class Inverse(Controller):
 
 def _of_actuator(i: int, alpha: int) -> tuple[Parameter, ...]:
     """Parameters of actuator i: the alpha of 1024 Hz that tracks best with a gain of one."""
-    return (
-        Parameter(f"gain_{i}", f"g_{i}", f"gain of actuator {i}", 1.0, "1", 0.0, above=True,
-                  kind="tunable"),
-        Parameter(f"delay_{i}", f"T_{i}", f"delay of actuator {i}", (alpha - 1) / 1024, "s", 0.0,
-                  0.2, kind="tunable"),
-    )  # fmt: skip
+    return gain_and_time(i, 1.0, "delay", "T", "delay", (alpha - 1) / 1024)
 
 
 ENTRY = Entry(

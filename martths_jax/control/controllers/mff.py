@@ -110,14 +110,20 @@ def check_band(name: str, value, benchmark) -> list[str]:
     return complaint(good, name, wanted, f"{value!r:.80}")
 
 
+#: Parameters of what the feedforward is fitted to, and of the filter.
+FIT = (
+    Parameter("order", "m", "highest derivative", 1, "1", 1, 3, whole=True, kind="static"),
+    Parameter("band_hz", "f_b", "band of the fit", BAND_HZ, "Hz", 0.0, above=True),
+)
+PROCESS_NOISE = Parameter("q", "q", "process noise", 3e-5, "mm^2", 0.0, above=True, kind="tunable")
+
 ENTRY = Entry(
     name="mff",
     controller=MFF,
     label="MFF",
     paper="Carrion & Spencer 2007; Phillips & Spencer 2013, model-based feedforward",
     parameters=(
-        Parameter("order", "m", "highest derivative", 1, "1", 1, 3, whole=True, kind="static"),
-        Parameter("band_hz", "f_b", "band of the fit", BAND_HZ, "Hz", 0.0, above=True),
-        Parameter("q", "q", "process noise", 3e-5, "mm^2", 0.0, above=True, kind="tunable"),
+        *FIT,
+        PROCESS_NOISE,
     ),
 )

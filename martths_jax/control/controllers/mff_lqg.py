@@ -26,7 +26,7 @@ import numpy as np
 
 from martths_jax.control.adaptive.arguments import check_positive, complaint, known
 from martths_jax.control.base import Decision, Signal
-from martths_jax.control.controllers.mff import BAND_HZ, MFF, check_band
+from martths_jax.control.controllers.mff import FIT, MFF, PROCESS_NOISE, check_band
 from martths_jax.control.entry import Entry, Parameter
 from martths_jax.control.estimators.kalman import steady_state_gains
 from martths_jax.structure.modal import ModalSystem, advance, contract, output, spread, to_dense
@@ -131,11 +131,10 @@ ENTRY = Entry(
     label="MFF + LQG",
     paper="Phillips & Spencer 2013; Fermandois & Spencer 2017, feedforward and LQG regulator",
     parameters=(
-        Parameter("order", "m", "highest derivative", 1, "1", 1, 3, whole=True, kind="static"),
-        Parameter("band_hz", "f_b", "band of the fit", BAND_HZ, "Hz", 0.0, above=True),
+        *FIT,
         Parameter("r", "r", "weight of the feedback", R, "1", 0.0, above=True),
         Parameter("sigma_mm", "sigma_w", "feedforward's error", SIGMA_MM, "mm", 0.0, above=True),
         Parameter("corner_hz", "f_w", "corner of that error", CORNER_HZ, "Hz", 0.0, above=True),
-        Parameter("q", "q", "process noise", 3e-5, "mm^2", 0.0, above=True, kind="tunable"),
+        PROCESS_NOISE,
     ),
 )

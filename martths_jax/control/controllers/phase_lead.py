@@ -15,6 +15,7 @@ from martths_jax.control.entry import Entry, Parameter
 from martths_jax.control.uncoupled import (
     FILTER,
     both,
+    gain_and_time,
     numbers,
     out_of_range,
     per_actuator,
@@ -92,12 +93,7 @@ def _of_actuator(i: int, gain: float, tau: float) -> tuple[Parameter, ...]:
     """Parameters of actuator i: what a first-order least-squares inverse of the nominal plant's
     strokes settles at under the reference motion.
     """
-    return (
-        Parameter(f"gain_{i}", f"g_{i}", f"gain of actuator {i}", gain, "1", 0.0, above=True,
-                  kind="tunable"),
-        Parameter(f"tau_{i}", f"tau_{i}", f"lead of actuator {i}", tau, "s", 0.0, 0.2,
-                  kind="tunable"),
-    )  # fmt: skip
+    return gain_and_time(i, gain, "tau", "tau", "lead", tau)
 
 
 ENTRY = Entry(
