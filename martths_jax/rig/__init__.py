@@ -1,0 +1,1 @@
+"""What the laboratory has: actuators and their coupler, sensors, specimens."""
