@@ -52,6 +52,7 @@ LAYOUT = Layout(
         volt_offset=(-0.0092 / 7.4921, 0.0059 / 7.3907),
         limit=3.8,
     ),
+    paper="Condori Uribe et al. 2023",
 )
 #: Valve command that counts as saturated [V].
 VOLT_LIMIT = LAYOUT.valves.limit

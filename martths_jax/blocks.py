@@ -298,7 +298,7 @@ def draw_on(devices, noise: SensorNoise, trial: np.ndarray, samples: int, fs: fl
         (``room_for(N)``, 1 or 2, T), zeros beyond N: as ``run_block`` needs it, without a copy.
     """
     program = noise_program(tuple(devices), samples, noise.channels)
-    return program(jnp.asarray(trial), noise.seed, noise.noise_power * fs)
+    return program(jnp.asarray(trial), noise.seed, noise.variances(fs))
 
 
 @lru_cache(maxsize=16)

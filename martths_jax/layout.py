@@ -40,6 +40,8 @@ class Layout:
         forces: where the specimen's force enters the numerical substructure.
         valves: of the actuators.
         runaway_mm: a command or stroke beyond this is a loop that has run away [mm].
+        paper: where the problem, and with it its indices, is defined.
+        table: name of the table of its indices, of ``indices.table.TABLES``.
         load_cells: whether the plant gives the specimen's force itself, in rows after the strokes.
     """
 
@@ -50,6 +52,8 @@ class Layout:
     valves: Valves
     runaway_mm: float = 100.0
     load_cells: bool = False
+    paper: str = ""
+    table: str = ""
 
     @property
     def inputs(self) -> int:

@@ -68,6 +68,11 @@ class Plants:
         nominal = NOMINAL_HZ[None] if self.nominal_hz is None else self.nominal_hz
         return nominal * (1 + SIGMA[None] * self.spread * self.draws)
 
+    @property
+    def values(self) -> jax.Array:
+        """(T, 9) values of the uncertain parameters: ``parameters_hz``."""
+        return self.parameters_hz
+
     def frequency_response(self, frequency_hz) -> jax.Array:
         """(F, 2, 2, T) complex response, see ``transfer.frequency_response``."""
         return frequency_response(self.parameters_hz, frequency_hz)

@@ -98,7 +98,7 @@ def simulate(
     """
     check_runtime()
     checks.check_simulation(benchmark, controller, plants, motion, noise, keep, progress)
-    chosen = choose(indices)
+    chosen = choose(indices, benchmark.layout)
     controller, per_trial = prepare(controller, benchmark, len(plants))
     if told := checks.plant_notice(benchmark, controller, plants):
         warnings.warn(told, stacklevel=2)

@@ -24,6 +24,7 @@ FLOORS = (
     ("loop",),
     ("checks", "result"),
     ("blocks",),
+    ("problem",),
     ("simulation", "stability"),
     ("nominal", "campaign"),
     ("study",),

@@ -19,6 +19,7 @@ from martths_jax.control.base import Controller
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.indices import DEFAULT, Index, choose
 from martths_jax.motions import DEFAULT_SCALE, Motion
+from martths_jax.problem import find_problem
 from martths_jax.published import COMPARED
 from martths_jax.sensors import SensorNoise
 from martths_jax.text import shortened
@@ -40,6 +41,8 @@ class StudyConfig:
 
     trials: int = 1000
     seed: int = 1
+    problem: str = "marths"
+    case: int | None = None
     controllers: tuple = COMPARED
     indices: tuple = DEFAULT
     draws: str = "independent"
@@ -89,7 +92,7 @@ class StudyConfig:
                 hint = f"; give one a name, as in {EXAMPLE}" if what == "controllers" else ""
                 found.append(f"Argument `{what}` names {name!r} twice{hint}.")
         try:
-            choose(self.indices)
+            choose(self.indices, find_problem(self.problem, self.case).layout)
         except InputError as error:
             found.append(str(error))
         if self.plants and self.draws != "independent":

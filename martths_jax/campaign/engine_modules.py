@@ -19,6 +19,8 @@ ENGINE_MODULES = (
     "observers.py",
     "once.py",
     "plant.py",
+    "problem/*.py",
+    "problem/*/*.py",
     "result.py",
     "rig/*.py",
     "rig/*/*.py",
