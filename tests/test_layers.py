@@ -15,7 +15,7 @@ FLOORS = (
     ("files", "runtime", "guests"),
     ("algebra", "structure"),
     ("motions",),
-    ("coupler", "sensors", "transfer"),
+    ("coupler", "sensors", "transfer", "rig"),
     ("plant",),
     ("control", "benchmark", "signals"),
     ("observers",),

@@ -1,0 +1,1 @@
+"""The rig of any problem: actuators, their uncertain plants, and what couples them to a frame."""
