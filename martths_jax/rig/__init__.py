@@ -1,1 +1,1 @@
-"""What the laboratory has: actuators and their coupler, sensors, specimens."""
+"""What the laboratory has: actuators with their uncertain plants, coupler, specimens."""
