@@ -18,7 +18,7 @@ from functools import lru_cache
 
 from martths_jax.errors import InputError
 from martths_jax.guests import Place, absent, is_place, load
-from martths_jax.indices import benchmark, frequency, tracking, true_stroke
+from martths_jax.indices import benchmark, frequency, tracking, true_stroke, uniaxial
 from martths_jax.indices.base import Index
 from martths_jax.layout import Layout
 
@@ -32,7 +32,7 @@ GROUPS = {
 KNOWN = {index.name: index for group in GROUPS.values() for index in group}
 #: Tables that a problem names (``Layout.table``): what stands in place of the benchmark's indices,
 #: or beside them.
-TABLES = {"": {}}
+TABLES = {"": {}, "uniaxial": uniaxial.GROUPS}
 _BY_ACTUATOR = {"true": true_stroke, "tracking": tracking, "frequency": frequency}
 #: What of one's own can be named, to complete "Give ...".
 WAYS = "package.module:NAME or path/file.py:NAME"

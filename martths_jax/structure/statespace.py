@@ -97,6 +97,7 @@ def discretise(
     dt: float,
     *,
     ports: Ports | None = None,
+    delay: int = 0,
     tolerance: float = 5e-11,
 ) -> ModalSystem:
     """Discrete modal system of a structure, reduced to the smallest order that keeps its response.
@@ -106,6 +107,7 @@ def discretise(
         integrator: the time integration method.
         dt: time step [s].
         ports: inputs and outputs; by default the benchmark's.
+        delay: samples by which the outputs come late, 0 or 1.
         tolerance: bound on the Hankel error left out, relative; 1e-11 keeps histories to about
             1e-10 of their peak.
 
@@ -115,5 +117,15 @@ def discretise(
     ports = ports or frame_ports()
     sizes, scales = ports.input_scale, ports.output_scale[:, None]
     A, B, C, D = integrator.discretise(*first_order(structure, ports), dt)
+    if delay:
+        A, B, C, D = _late(A, B, C, D)
     A_r, B_r, C_r = balanced_truncation(A, B * sizes, C / scales, tolerance)
     return from_dense(A_r, B_r / sizes, C_r * scales, D)
+
+
+def _late(A, B, C, D):
+    """The same system, whose outputs of a sample are given one sample later."""
+    n, o = len(A), len(C)
+    D = np.zeros((o, B.shape[1])) if D is None else D
+    A = np.block([[A, np.zeros((n, o))], [C, np.zeros((o, o))]])
+    return A, np.vstack([B, D]), np.hstack([np.zeros((o, n)), np.eye(o)]), None
