@@ -16,7 +16,7 @@ FLOORS = (
     ("algebra", "structure"),
     ("motions",),
     ("coupler", "sensors", "transfer", "rig"),
-    ("plant",),
+    ("plant", "problem"),
     ("control", "benchmark", "signals"),
     ("observers",),
     ("indices",),
