@@ -81,6 +81,10 @@ class StudyConfig:
         ]
         if found:
             return found
+        try:
+            problem = find_problem(self.problem, self.case)
+        except InputError as error:
+            return [str(error)]
         for what, kind in (("controllers", Controller), ("motions", Motion)):
             given = getattr(self, what) or ()
             odd = [g for g in given if not isinstance(g, (str, kind))]
@@ -92,9 +96,12 @@ class StudyConfig:
                 hint = f"; give one a name, as in {EXAMPLE}" if what == "controllers" else ""
                 found.append(f"Argument `{what}` names {name!r} twice{hint}.")
         try:
-            choose(self.indices, find_problem(self.problem, self.case).layout)
+            choose(self.indices, problem.layout)
         except InputError as error:
             found.append(str(error))
+        if self.partition not in problem.partitions:
+            known = ", ".join(problem.partitions)
+            found.append(str(argument_error("partition", f"be one of {known}", self.partition)))
         if self.plants and self.draws != "independent":
             found.append("Arguments `plants` and `draws` exclude each other; give one of them.")
         return found
@@ -142,6 +149,7 @@ def _plain(value):
 def _from_mapping(settings: dict) -> StudyConfig:
     known = {f.name for f in fields(StudyConfig)}
     problems = unknown_names(sorted(set(settings) - known), known, "Setting")
+    settings = _usual(settings) | settings
     config = StudyConfig(**{k: _plain(v) for k, v in settings.items() if k in known})
     try:
         config = _expanded(config)
@@ -149,6 +157,15 @@ def _from_mapping(settings: dict) -> StudyConfig:
         problems.append(str(error))
     raise_all([*problems, *config.problems()])
     return config
+
+
+def _usual(settings: dict) -> dict:
+    """Settings of the problem that is meant, where they are other than a study's usual ones."""
+    try:
+        problem = find_problem(settings.get("problem", StudyConfig.problem), settings.get("case"))
+    except InputError:
+        return {}  # said by ``StudyConfig.problems``
+    return dict(problem.settings)
 
 
 def unknown_names(names, known, what: str) -> list[str]:

@@ -17,7 +17,7 @@ DRAWS = ("independent", "lhs", "sobol")
 #: Trials are numbered in 32 bits; the larger half of the numbers is for the noise of sensitivity
 #: analyses.
 MOST_TRIALS = 2**30 - 1
-CSV_KINDS = ("auto", "draws", "hz", "rad/s")
+CSV_KINDS = ("auto", "draws", "hz", "rad/s", "values")
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cache, partial
 
 from martths_jax.errors import argument_error
 from martths_jax.problem.base import Problem
 from martths_jax.problem.marths import MARTHS
+from martths_jax.problem.uniaxial.problem import uniaxial
+from martths_jax.problem.uniaxial.structure import CASES
 
 #: Name -> its cases by number; a problem that has none stands under None.
 PROBLEMS: Mapping[str, Mapping[int | None, Callable[[], Problem]]] = {
     "marths": {None: lambda: MARTHS},
+    "uniaxial": {case: partial(uniaxial, case) for case in CASES},
 }
 
 
@@ -33,4 +37,9 @@ def find_problem(name: str = "marths", case: int | None = None) -> Problem:
         known = [str(one) for one in cases if one is not None]
         wanted = f"be one of {', '.join(known)}" if known else f"be left out, {name} has none"
         raise argument_error("case", wanted, repr(case))
-    return cases[case]()
+    return _made(name, case)
+
+
+@cache  # the same object each time, so that JAX knows its parts again
+def _made(name: str, case: int | None) -> Problem:
+    return PROBLEMS[name][case]()

@@ -114,7 +114,9 @@ def roots(coefficients, start: Roots, iterations: int = ITERATIONS) -> Roots:
         with np.errstate(all="ignore"):  # roots of other kinds; see ``is_root``
             found = begin
             for _ in range(iterations):
-                found = _aberth(c, found)
+                before, found = found, _aberth(c, found)
+                if np.allclose(before.stacked(), found.stacked(), rtol=1e-14, atol=0):
+                    break
             return _newton(c, _newton(c, found))
     still = [jax.lax.stop_gradient(x) for x in c]
     found = jax.lax.fori_loop(0, iterations, lambda _, s: _aberth(still, s), begin)

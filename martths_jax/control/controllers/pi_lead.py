@@ -64,7 +64,7 @@ class LeadAndPI(Controller):
         g, z, p = self.lead_gain, self.lead_zero, self.lead_pole
         led = (g * ((c + z) * seen.x_a + (z - c) * target) - (p - c) * led) / (c + p)
         late = led - seen.x_m
-        P, I = self.proportional, self.integral  # noqa: E741
+        P, I = self.proportional, self.integral
         command = (P + I / c) * late + (I / c - P) * error + command
         return (seen.x_a, led, late, command), Decision(u=command)
 

@@ -20,7 +20,7 @@ from martths_jax.problem.base import Problem, Reading
 from martths_jax.problem.uniaxial import structure
 from martths_jax.problem.uniaxial.plant import PACKAGE, Loop, plant_model
 from martths_jax.rig import plants
-from martths_jax.rig.coupler import Direct
+from martths_jax.rig.direct import Direct
 from martths_jax.rig.specimen import LinearSpecimen
 from martths_jax.runtime import check_runtime
 from martths_jax.sensors import SensorNoise
