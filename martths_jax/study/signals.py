@@ -129,7 +129,7 @@ def _shared(engine: Engine, motion: str) -> xr.Dataset:
         },
         {
             "time": ("time", np.arange(ground.size) / engine.plan.benchmark.fs, {"units": "s"}),
-            "dof": np.array([4, 28, 2, 26, 3, 27], dtype=np.int32),
+            "dof": places(engine.plan.problem.layout.outputs),
         },
     )  # fmt: skip
 
