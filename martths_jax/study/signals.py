@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from martths_jax.campaign.dataset import index_names, read_dataset, write_dataset
+from martths_jax.campaign.dataset import index_names, places, read_dataset, write_dataset
 from martths_jax.campaign.engine import Engine
 from martths_jax.campaign.files import writing
 from martths_jax.campaign.store import FORMAT
