@@ -111,16 +111,16 @@ def _build(
     whole, own = structure.reference(case), structure.numerical(case, loop)
     at = partial(discretise, integrator=method, dt=dt, ports=structure.PORTS)
     A, B, C = nominal.continuous()
+    discrete = _shared(nominal.discretise(dt))
     row = np.eye(1)
     return Benchmark(
         fs=float(fs),
         numerical=at(own, delay=TARGET_DELAY),
         reference=at(whole),
-        specimen=LinearSpecimen.of(
-            loop.mass * row, loop.damping * row, loop.stiffness * row, dt
-        ),
+        specimen=LinearSpecimen.of(loop.mass * row, loop.damping * row, loop.stiffness * row, dt),
         coupler=Direct(1),
-        plant_model=_first_row(nominal.discretise(dt)),
+        plant_model=replace(discrete, C=discrete.C[:1]),
+        plant_forces=discrete,
         plant_continuous=(A, B, C[:1]),
         noise_power=NOISE_MM2,
         force_from=force_from,
@@ -130,6 +130,6 @@ def _build(
     )
 
 
-def _first_row(plant: ModalSystem) -> ModalSystem:
-    """The plant with its stroke alone, which filters are designed for."""
-    return replace(plant, C=plant.C[:1])
+def _shared(plant: ModalSystem) -> ModalSystem:
+    """One plant of a batch of one, shared by all trials."""
+    return replace(plant, B=plant.B[..., 0], C=plant.C[..., 0])
