@@ -71,7 +71,6 @@ class Benchmark:
         coupler: geometry between actuators and interface.
         plant_model: the plant that controllers and filters are designed for, discretised.
         plant_continuous: (A, B, C) of that plant, states slot by slot.
-        plant_forces: the same plant with the load cells' rows after the strokes; None without any.
         noise_power: power of the sensor noise that filters are designed for [mm^2 s].
         force_filter: the force path's own ``Estimator``, where `force_from` is ``filter``.
         force_from: strokes that the restoring force is made from: the controller's ``estimate``,
@@ -89,7 +88,6 @@ class Benchmark:
     plant_continuous: tuple
     noise_power: float
     force_filter: Any = None
-    plant_forces: ModalSystem | None = None
     force_from: str = field(default="estimate", metadata={"static": True})
     integrator: str = field(default="newmark", metadata={"static": True})
     partition: str = field(default="benchmark", metadata={"static": True})
@@ -99,11 +97,6 @@ class Benchmark:
     def dt(self) -> float:
         """Sample period [s]."""
         return 1.0 / self.fs
-
-    @property
-    def nominal(self) -> ModalSystem:
-        """``plant_model`` with everything that it gives."""
-        return self.plant_model if self.plant_forces is None else self.plant_forces
 
     @property
     def r_mm2(self) -> float:

@@ -95,20 +95,7 @@ def spectral_radius(benchmark: Benchmark, controller: Controller, plants: Plants
 
     Arguments as in ``linear_loop``.
     """
-    return _radius(np.asarray(linear_loop(benchmark, controller, plants)))
-
-
-def nominal_spectral_radius(benchmark: Benchmark, controller: Controller) -> float:
-    """The same of the plant that the benchmark was built for, for a prepared controller."""
-    system = benchmark.nominal
-    trial = lambda x, axes: x if x.ndim == axes + 1 else x[..., None]  # noqa: E731
-    one = replace(system, B=trial(system.B, 3), C=trial(system.C, 3))
-    A, B, C = _linearised(benchmark, controller, one)
-    return float(_radius(np.asarray(A + B @ C))[0])
-
-
-def _radius(A: np.ndarray) -> np.ndarray:
-    """(T,) largest magnitudes of eigenvalues of (T, n, n); NaN where a number is not finite."""
+    A = np.asarray(linear_loop(benchmark, controller, plants))
     radius = np.full(len(A), np.nan)
     finite = np.isfinite(A).all(axis=(1, 2))
     radius[finite] = np.abs(np.linalg.eigvals(A[finite])).max(axis=1)

@@ -21,7 +21,7 @@ FLOORS = (
     ("observers",),
     ("indices",),
     ("watch",),
-    ("loop",),
+    ("loop", "reference"),
     ("checks", "result"),
     ("blocks",),
     ("problem",),

@@ -95,8 +95,8 @@ class LQG(Controller):
 
         Raises:
             InputError: if a weight is not positive (y may be zero) or traced, no solution exists,
-                `error` is neither of the two, or the loop is unstable on the benchmark's own plant
-                at its sampling rate.
+                `error` is neither of the two, or the loop is unstable on the maRTHS benchmark's own
+                plant at its sampling rate; of another problem's loop ``stability`` tells.
         """
         check_runtime()
         if not isinstance(benchmark, Benchmark):
@@ -138,7 +138,7 @@ class LQG(Controller):
                 weights=(("e", tuple(e)), ("r", tuple(r)), ("y", tuple(y)), ("q", float(q))),
                 error=error,
             )
-        if not allow_unstable:
+        if not allow_unstable and benchmark.layout == LAYOUT:
             refuse_unstable(benchmark, made, q)
         return made
 
@@ -271,18 +271,11 @@ def refuse_unstable(benchmark, made: LQG, q: float) -> None:
     Raises:
         InputError: with the lowest sampling rate that holds, where that is the cause.
     """
-    lowest = None
-    if benchmark.layout == LAYOUT:
-        step = jax.tree.map(np.asarray, replace(made, estimator=None)).step
-        radius = nominal_radius(benchmark, made.estimator.filter_gain, step)
-        lowest = None if radius < 1 else lowest_stable_rate(benchmark, q, step)
-    else:
-        # It stands above the controllers, and knows any problem's loop.
-        from martths_jax.stability import nominal_spectral_radius
-
-        radius = nominal_spectral_radius(benchmark, made.prepare(benchmark))
+    step = jax.tree.map(np.asarray, replace(made, estimator=None)).step
+    radius = nominal_radius(benchmark, made.estimator.filter_gain, step)
     if radius < 1:
         return
+    lowest = lowest_stable_rate(benchmark, q, step)
     remedy = "Raise r or lower e"
     if lowest is not None:
         remedy = (

@@ -120,7 +120,6 @@ def _build(
         specimen=LinearSpecimen.of(loop.mass * row, loop.damping * row, loop.stiffness * row, dt),
         coupler=Direct(1),
         plant_model=replace(discrete, C=discrete.C[:1]),
-        plant_forces=discrete,
         plant_continuous=(A, B, C[:1]),
         noise_power=NOISE_MM2,
         force_from=force_from,
