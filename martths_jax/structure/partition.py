@@ -1,13 +1,15 @@
 """What of a structure stands in the laboratory, and what is left of it to compute.
 
-The laboratory part acts on the interface alone: its other degrees of freedom move freely there and
-are condensed, R from the interface to all of them, and its force is f = M_L a + C_L v + K_L x with
-K_L = R' K R.  The numerical substructure is the reference minus exactly that,
+The laboratory part acts on the interface alone: its other degrees of freedom move freely there,
+unless the laboratory holds them, and are condensed, R from the interface to all of them.  Its force
+is f = M_L a + C_L v + K_L x with K_L = R' K R.  The numerical substructure is the reference minus
+exactly that,
 
     M_N = M - E M_L E',    C_N = C - E C_L E',    K_N = K - E K_L E',
 
 E from the interface to all degrees of freedom, so that both parts together are the reference.
-Degrees of freedom that only the laboratory part has are condensed in the reference too.
+Degrees of freedom that only the laboratory part has are condensed in the reference too, their
+inertia as in the laboratory.
 """
 
 from __future__ import annotations
@@ -81,7 +83,9 @@ class Separation:
 
     Attributes:
         kept: (k,) which of the reference's n degrees of freedom stay.
-        R: (n, k) motion of all of them per motion of those.
+        R: (n, k) motion of all of them per motion of those, under static forces on those.
+        R_mass: (n, k) the same for inertia: what only the laboratory part has follows the
+            interface alone, as it does there.
         at: (b,) where the interface stands among the k.
         M, K: (b, b) of the laboratory part.
         C: (b, b) its damping, None where it has none of its own.
@@ -91,6 +95,7 @@ class Separation:
 
     kept: np.ndarray
     R: np.ndarray
+    R_mass: np.ndarray
     at: np.ndarray
     M: np.ndarray
     K: np.ndarray
@@ -100,7 +105,12 @@ class Separation:
 
 
 def separate(
-    dofs: Sequence[str], M: np.ndarray, K: np.ndarray, part: Part, interface: Sequence[str]
+    dofs: Sequence[str],
+    M: np.ndarray,
+    K: np.ndarray,
+    part: Part,
+    interface: Sequence[str],
+    held: Sequence[str] = (),
 ) -> Separation:
     """Condense the laboratory part to its interface, and what only it has out of the reference.
 
@@ -109,6 +119,7 @@ def separate(
         M, K: (n, n) of the reference, laboratory part included.
         part: the laboratory part; it may have degrees of freedom that the reference lacks.
         interface: names of the b degrees of freedom that actuators move, all in `dofs`.
+        held: names of what the laboratory holds fixed though it moves in the reference.
 
     Raises:
         InputError: if the laboratory part is loose with its interface held, or does not resist
@@ -120,6 +131,7 @@ def separate(
     K_L, M_L = _placed(part.K, part.dofs, names), _placed(part.M, part.dofs, names)
     reached = (np.diag(K_L) > 0) | (np.arange(len(names)) >= n)
     reached[b] = False
+    reached[[i for i, name in enumerate(names) if name in held]] = False
     alone = np.arange(len(names)) >= n
     alone[:n] = _none_left(K, K_L[:n, :n]) & _none_left(M, M_L[:n, :n])
     own, shared = np.flatnonzero(reached & alone), np.flatnonzero(reached & ~alone)
@@ -137,10 +149,15 @@ def separate(
         C_L = _placed(part.C, part.dofs, names)[np.ix_(on, on)]
         C = _symmetric(R.T @ C_L @ R)
     kept = np.setdiff1d(np.arange(n), own)
+    at = np.searchsorted(kept, b)
+    R_mass = np.eye(n)[:, kept]
+    inside = own < n
+    R_mass[np.ix_(own[inside], at)] = R[b.size : b.size + own.size][inside]
     return Separation(
         kept=kept,
         R=condense(K, kept)[1],
-        at=np.searchsorted(kept, b),
+        R_mass=R_mass,
+        at=at,
         M=_symmetric(moved.T @ M_L[np.ix_(on, on)] @ moved),
         K=_symmetric(K_b),
         C=C,

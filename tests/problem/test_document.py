@@ -100,8 +100,8 @@ def test_all_faults_come_at_once_by_line():
         "  4. problem.toml, line 5: `E` in [rod] must be a number above zero (Pa), but got 'x'.",
         "  5. problem.toml, line 6: `kind` in [rod] names 'stele', which is unknown: the nearest "
         "is steel.",
-        "  6. problem.toml, line 7: Table `further` is unknown: known are b, force, length, mass, rod, "
-        "units.",
+        "  6. problem.toml, line 7: Table `further` is unknown: known are b, force, length, mass, "
+        "rod, units.",
     ]
 
 
@@ -155,7 +155,7 @@ def test_a_wrong_value_is_one_sentence_with_its_line(case):
 UNITS = {
     "missing": ("a = 1", "line 1: The units are missing: write units ="),
     "one of three": ('length = "mm"\nmass = "t"', "line 1: The unit of force is missing: write"),
-    "unknown": ('units = "SI units"', "line 1: `units` names 'SI units', which is unknown: known are SI."),
+    "unknown": ('units = "SI units"', "line 1: `units` names 'SI units', which is unknown: known"),
     "unknown length": ('force = "N"\nmass = "kg"\nlength = "metre"',
                        "line 3: `length` names 'metre', which is unknown: known are m, cm, mm,"),
     "both": ('units = "SI"\nmass = "kg"', "line 2: `mass` says a unit beside units = "),

@@ -15,7 +15,7 @@ from martths_jax.structure.damping import (
     modal_damping,
     rayleigh_coefficients,
 )
-from martths_jax.structure.modes import massive, natural_modes
+from martths_jax.structure.modes import condense, massive, natural_modes
 from martths_jax.text import counted
 
 KINDS = ("rayleigh", "modal", "caughey", "none")
@@ -137,6 +137,13 @@ def _modal(M: np.ndarray, K: np.ndarray, ratio) -> np.ndarray:
 
 
 def _caughey(M: np.ndarray, K: np.ndarray, modes: tuple[int, ...], ratio) -> np.ndarray:
-    """Caughey series with the powers 0, 1, 2 ... that has the ratios in as many modes."""
+    """Caughey series with the powers 0, 1, 2 ... that has the ratios in as many modes.
+
+    Coordinates without mass are condensed, so that no damping acts on them.
+    """
     omega = _frequencies(M, K, modes)
-    return caughey_damping(M, K, caughey_coefficients(omega, ratio))
+    m = massive(M)
+    heavy = np.ix_(m, m)
+    C = np.zeros_like(M)
+    C[heavy] = caughey_damping(M[heavy], condense(K, m)[0], caughey_coefficients(omega, ratio))
+    return C

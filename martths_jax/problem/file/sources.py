@@ -30,6 +30,7 @@ class Whole:
         influence: (q,) motion as the ground moves by one.
         part: the laboratory part.
         interface: names of what actuators move.
+        held: names of what the laboratory holds fixed.
         outputs: name -> (q,) row of what is looked at.
         drawing: the frame, None for matrices.
         in_laboratory: names of the members that stand in the laboratory.
@@ -44,6 +45,7 @@ class Whole:
     influence: np.ndarray
     part: Part
     interface: tuple[str, ...]
+    held: tuple[str, ...]
     outputs: Mapping[str, np.ndarray]
     drawing: PlanarFrame | None
     in_laboratory: frozenset[str]
@@ -80,6 +82,25 @@ def _together(root: Table, laboratory, interface, what: str) -> None:
             root.fault(there, f"`{there}` is given without `{missing}`: give both or none.")
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """Names of degrees of freedom that the top of the file lists."""
+
+    interface: tuple[str, ...]
+    held: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    @classmethod
+    def read(cls, root: Table, dofs: Sequence[str], supported: Sequence[str] = ()) -> _Asked:
+        keys = ("interface", "laboratory_held", "outputs")
+        asked = cls(*(_dofs_of(root, key, dofs, supported) for key in keys))
+        for name in asked.held:
+            if name in asked.interface:
+                sentence = f"`laboratory_held` names {name}, which stands in `interface` too."
+                root.fault("laboratory_held", sentence)
+        return asked
+
+
 def read_frame_form(document: Document) -> Whole | None:
     """A frame of the tables, or of an OpenSees model with what the tables add."""
     root = document.root
@@ -89,65 +110,67 @@ def read_frame_form(document: Document) -> Whole | None:
         if name in tables.members or name in tables.masses:
             document.fault(("members",), f"The name {name!r} stands for a group and another part.")
     laboratory = root.texts("laboratory", known, ())
-    held = [f"{node}.{d}" for node, found in tables.supports.items() for d in found]
-    interface = _dofs_of(root, "interface", tables.dofs, held)
-    outputs = _dofs_of(root, "outputs", tables.dofs, held)
+    supported = [f"{node}.{d}" for node, found in tables.supports.items() for d in found]
+    asked = _Asked.read(root, tables.dofs, supported)
     direction = _ground(root)
-    _together(root, laboratory, interface, "laboratory")
+    _together(root, laboratory, asked.interface, "laboratory")
     if not document.good:
         return None
     with document.blame(("supports",)):
         frame = tables.frame()
         assembly = assemble(frame)
-        return _whole(document, tables, frame, assembly, laboratory, interface, outputs, direction)
-    return None
-
-
-def _whole(
-    document, tables, frame, assembly: Assembly, laboratory, interface, outputs, direction
-) -> Whole | None:
-    in_laboratory = [m for name in laboratory for m in tables.groups.get(name, [name])]
-    in_laboratory = list(dict.fromkeys(in_laboratory))
-    members = [name for name in in_laboratory if name in tables.members]
-    masses = [pair for name in in_laboratory for pair in tables.masses.get(name, ())]
-    free = [frame.dofs.index(name) for name in assembly.dofs]
-    K_L, M_L = (m[np.ix_(free, free)] for m in part_matrices(frame, members, masses))
-    T = assembly.T
-    names = list(assembly.coordinates)
-    taken: dict[int, str] = {}
-    for name in interface:
-        row = assembly.at(name)
-        places = np.flatnonzero(row)
-        if len(places) != 1 or row[places[0]] != 1:
-            shown = " and ".join(names[i] for i in places)
-            document.fault(
-                ("interface",),
-                f"`interface` names {name}, which a constraint makes of {shown}: name those.",
-            )
-        elif places[0] in taken:
-            other = taken[places[0]]
-            document.fault(
-                ("interface",),
-                f"`interface` names {other} and {name}, which move as one: name one.",
-            )
-        else:
-            taken[places[0]] = names[places[0]] = name
     if not document.good:
         return None
+    inside = [part for name in laboratory for part in tables.groups.get(name, [name])]
+    inside = list(dict.fromkeys(inside))
+    names = _names(root, assembly, "interface", asked.interface)
+    held = _names(root, assembly, "laboratory_held", asked.held)
+    if not document.good:
+        return None
+    dofs = tuple(names.get(i, name) for i, name in enumerate(assembly.coordinates))
     return Whole(
-        dofs=tuple(names),
+        dofs=dofs,
         M=assembly.M,
         K=assembly.K,
         C=None,
         influence=assembly.influence(direction),
-        part=Part(tuple(names), T.T @ M_L @ T, T.T @ K_L @ T),
-        interface=interface,
-        outputs={name: assembly.at(name) for name in outputs},
+        part=_part(tables, frame, assembly, inside, dofs),
+        interface=asked.interface,
+        held=tuple(dofs[i] for i in held),
+        outputs={name: assembly.at(name) for name in asked.outputs},
         drawing=frame,
-        in_laboratory=frozenset(members),
+        in_laboratory=frozenset(name for name in inside if name in tables.members),
         place=("supports",),
         laboratory_place=("laboratory",),
     )
+
+
+def _names(root: Table, assembly: Assembly, key: str, asked: Sequence[str]) -> dict[int, str]:
+    """Independent coordinates that degrees of freedom stand for, by the names given here."""
+    found: dict[int, str] = {}
+    for name in asked:
+        row = assembly.at(name)
+        places = np.flatnonzero(row)
+        if len(places) != 1 or row[places[0]] != 1:
+            shown = " and ".join(assembly.coordinates[i] for i in places)
+            sentence = f"`{key}` names {name}, which a constraint makes of {shown}: name those."
+            root.fault(key, sentence)
+        elif places[0] in found:
+            other = found[places[0]]
+            root.fault(key, f"`{key}` names {other} and {name}, which move as one: name one.")
+        else:
+            found[int(places[0])] = name
+    return found
+
+
+def _part(tables, frame: PlanarFrame, assembly: Assembly, inside, dofs) -> Part:
+    """Members and masses of the laboratory in the independent coordinates."""
+    members = [name for name in inside if name in tables.members]
+    masses = [pair for name in inside for pair in tables.masses.get(name, ())]
+    free = np.ix_(*[[frame.dofs.index(name) for name in assembly.dofs]] * 2)
+    K, M = (matrix[free] for matrix in part_matrices(frame, members, masses))
+    T = assembly.T
+    return Part(dofs, T.T @ M @ T, T.T @ K @ T)
 
 
 def _read_opensees(document: Document) -> FrameTables | None:
@@ -184,13 +207,12 @@ def read_matrices_form(document: Document, table: Table) -> Whole | None:
             "[laboratory_matrices]."
         )  # fmt: skip
     if found is None:
-        for key in ("interface", "outputs", "ground"):
+        for key in ("interface", "laboratory_held", "outputs", "ground"):
             _ = key in root  # known, though there is nothing yet to look them up in
         return None
-    interface = _dofs_of(root, "interface", dofs)
-    outputs = _dofs_of(root, "outputs", dofs)
+    asked = _Asked.read(root, dofs)
     r = _influence(root, found)
-    _together(root, part, interface, "laboratory_matrices")
+    _together(root, part, asked.interface, "laboratory_matrices")
     if r is None or not document.good:
         return None
     empty = np.zeros((0, 0))
@@ -201,8 +223,9 @@ def read_matrices_form(document: Document, table: Table) -> Whole | None:
         C=found.C,
         influence=r,
         part=Part(part.dofs, part.M, part.K, part.C) if part else Part((), empty, empty),
-        interface=interface,
-        outputs={name: np.eye(len(dofs))[dofs.index(name)] for name in outputs},
+        interface=asked.interface,
+        held=asked.held,
+        outputs={name: np.eye(len(dofs))[dofs.index(name)] for name in asked.outputs},
         drawing=None,
         in_laboratory=frozenset(),
         place=table.path,

@@ -105,7 +105,7 @@ def read_structure(document: Document) -> StructureData | None:
     if not document.good:
         return None
     with document.blame(("laboratory",) if matrices is None else ("laboratory_matrices",)):
-        separation = separate(whole.dofs, whole.M, whole.K, whole.part, whole.interface)
+        separation = separate(whole.dofs, whole.M, whole.K, whole.part, whole.interface, whole.held)
     if not document.good:
         return None
     return _Building(document, whole, separation, condensing).data(**rules)
@@ -132,8 +132,8 @@ class _Building:
         self.notes: list[str] = list(whole.notes)
         self._tell_separation()
         s, R = separation, separation.R
-        self.kept, self.R, self.at = s.kept, R, s.at
-        self.M, self.K = R.T @ whole.M @ R, R.T @ whole.K @ R
+        self.kept, self.R, self.R_mass, self.at = s.kept, R, s.R_mass, s.at
+        self.M, self.K = s.R_mass.T @ whole.M @ s.R_mass, R.T @ whole.K @ R
         if s.own:
             self._tell_loss()
         if condensing:
@@ -174,7 +174,8 @@ class _Building:
             return
         self.K, R = condense(self.K, kept)
         self.K = (self.K + self.K.T) / 2
-        self.R, self.kept = self.R @ R, self.kept[kept]
+        self.R, self.R_mass = self.R @ R, self.R_mass @ R
+        self.kept = self.kept[kept]
         self.M, self.at = self.M[np.ix_(kept, kept)], np.searchsorted(kept, self.at)
         text = f"{counted(lost, 'degree', 'degrees')} of freedom without mass condensed: "
         text += "frequencies and modes stay"
@@ -197,7 +198,7 @@ class _Building:
             C_L = self._laboratory_damping(damping, laboratory_damping)
         if not self.document.good:
             return None
-        r = condensed_influence(whole.M, whole.influence, R, self.kept)
+        r = condensed_influence(whole.M, whole.influence, self.R_mass, self.kept)
         reference = SystemMatrices(dofs, self.M, C, self.K, r)
         s = self.separation
         laboratory = SystemMatrices(whole.interface, s.M, C_L, s.K, r[self.at])
