@@ -90,11 +90,8 @@ def read_structure(document: Document) -> StructureData | None:
         rules[key] = read_damping(table) if table else None
     matrices = root.table("matrices")
     whole = read_matrices_form(document, matrices) if matrices else read_frame_form(document)
-    if (
-        rules["damping"] is None
-        and "damping" not in root.data
-        and (whole is None or whole.C is None)
-    ):
+    known = whole is not None or matrices is None
+    if known and "damping" not in root.data and (whole is None or whole.C is None):
         root.fault(None, 'The damping is missing: write [damping] with kind = "rayleigh", say.')
     elif rules["damping"] and whole and whole.C is not None:
         root.fault("damping", "Damping is given twice: by the matrix C and by [damping].")

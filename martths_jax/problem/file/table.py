@@ -147,14 +147,18 @@ class Table:
         return as_name(found) if self.is_known(key, as_name(found), known) else None
 
     def texts(self, key: str, known: Sequence[str] | None = None, default: Any = NEEDED):
-        """A list of names, those that are known; each that is not is a fault of its own."""
+        """A list of names, those that are known; each that is not is a fault of its own.
+
+        Returns:
+            A tuple, the default where the list is missing.
+        """
 
         def good(value):
             return isinstance(value, list) and all(as_name(v) is not None for v in value)
 
-        found = self._get(key, good, "be a list of names", default)
-        if found is None or found is default:
-            return () if found is None else found
+        if key not in self and default is not NEEDED:
+            return default
+        found = self._get(key, good, "be a list of names", default) or ()
         names = list(map(as_name, found))
         for name in sorted({n for n in names if names.count(n) > 1}):
             where = f" in {place(self.path)}" if self.path else ""
