@@ -19,6 +19,7 @@ from martths_jax.structure.modes import condense, massive, natural_modes
 from martths_jax.text import counted
 
 KINDS = ("rayleigh", "modal", "caughey", "none")
+KEYS = ("ratio", "modes", "omega", "a_0", "a_1")
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,13 @@ class Damping:
 def read_damping(table: Table) -> Damping | None:
     """The rule of a table; None where something in it is wrong."""
     kind = table.text("kind", KINDS)
+    if kind is None:
+        _ = [key in table for key in KEYS]  # which of them count is not known
+        return None
     if kind == "none":
         return _rayleigh(lambda M, K: (0.0, 0.0), kind)
     if kind == "rayleigh":
         return _read_rayleigh(table)
-    if kind is None:
-        return None
     ratio = table.one_or_more("ratio")
     modes = _modes(table) if kind == "caughey" else None
     if ratio is None or (kind == "caughey" and modes is None):
@@ -78,6 +80,7 @@ def _read_rayleigh(table: Table) -> Damping | None:
     """By two coefficients, or by ratios in two modes or at two circular frequencies."""
     ways = [way for way in ("a_0", "modes", "omega") if way in table]
     if len(ways) != 1:
+        _ = [key in table for key in KEYS]
         table.fault(
             None,
             "Rayleigh damping needs one of: `a_0` and `a_1`, or `modes` and `ratio`, or `omega` "

@@ -40,7 +40,8 @@ class FrameTables:
         masses: name of a point mass -> (degree of freedom, mass) pairs.
         relations: of constraints.
         groups: name of a group -> its members.
-        where: (kind, name) -> place in the document.
+        where: (kind, name) -> place in the document, of entries that are wrong too, so that what
+            names them is not taken for another fault.
     """
 
     nodes: dict[str, Node] = field(default_factory=dict)
@@ -56,7 +57,11 @@ class FrameTables:
     @property
     def dofs(self) -> tuple[str, ...]:
         """Names of all degrees of freedom, held ones included."""
-        return tuple(f"{node}.{direction}" for node in self.nodes for direction in DIRECTIONS)
+        return tuple(f"{node}.{d}" for node in self.known("node") for d in DIRECTIONS)
+
+    def known(self, kind: str) -> tuple[str, ...]:
+        """Names of all nodes, sections, members or masses that the document has."""
+        return tuple(name for one, name in self.where if one == kind)
 
     def frame(self) -> PlanarFrame:
         """The frame; point masses at one degree of freedom are added.
@@ -99,28 +104,31 @@ def read_frame(document: Document, start: FrameTables | None = None) -> FrameTab
     return tables
 
 
-def _is_new(table: Table, tables: FrameTables, kind: str, name: str, known) -> bool:
+def _is_new(table: Table, tables: FrameTables, kind: str, name: str) -> bool:
     """Whether no other entry has the name, which is then kept with its place."""
-    if name in known:
-        table.fault(None, f"The name {name!r} stands for two {kind}s: give one another name.")
-        return False
-    tables.where[kind, name] = table.path
-    return True
+    before = tables.where.setdefault((kind, name), table.path)
+    if before is table.path:
+        return True
+    kind = f"{kind}es" if kind.endswith("s") else f"{kind}s"
+    line = table.document.line(before)
+    table.fault(None, f"The name {name!r} stands for two {kind}, first on line {line}: change one.")
+    return False
 
 
 def _read_nodes(root: Table, tables: FrameTables) -> None:
-    for name, table in root.named("nodes"):
+    for name, table in root.named("nodes", once=False):
         x, y = table.number("x", "m"), table.number("y", "m")
         if table.number("z", "m", 0.0) != 0:
             table.wrong("z", "be left out or zero: the frame stands in the plane x, y")
         if "." in name:
             table.fault(None, f"The name of a node must have no dot in it, but one is {name!r}.")
-        elif np.isfinite([x, y]).all() and _is_new(table, tables, "node", name, tables.nodes):
+        elif _is_new(table, tables, "node", name) and np.isfinite([x, y]).all():
             tables.nodes[name] = Node(x, y)
 
 
 def _read_sections(root: Table, tables: FrameTables) -> None:
     for name, table in root.named("sections"):
+        tables.where["section", name] = table.path
         E = table.number("E", "Pa", above=0)
         A = table.number("A", "m^2", least=0)
         I = table.number("I", "m^4", above=0)
@@ -137,19 +145,18 @@ def _read_sections(root: Table, tables: FrameTables) -> None:
             continue
         A_s, G = (np.inf, E) if A_s is None else (A_s, G)
         if np.isfinite([E, A, I, G, density]).all() and not np.isnan(A_s):
-            tables.where["section", name] = table.path
             tables.sections[name] = Section(A, I, A_s)
             tables.materials[name] = Material(E, G, density)
 
 
 def _read_members(root: Table, tables: FrameTables) -> None:
-    for name, table in root.named("members", needed=False):
-        ends = table.texts("ends", tables.nodes)
+    for name, table in root.named("members", once=False, needed=False):
+        ends = table.texts("ends", tables.known("node"))
         if len(ends) != 2:
             given = table.data.get("ends")
             if not isinstance(given, list) or len(given) != 2 or given[0] == given[1]:
                 table.wrong("ends", "be a list of two nodes")
-        section = table.text("section", tables.sections)
+        section = table.text("section", tables.known("section"))
         settings = {
             "rigid_start": table.number("rigid_start", "m", 0.0, least=0),
             "rigid_end": table.number("rigid_end", "m", 0.0, least=0),
@@ -162,12 +169,15 @@ def _read_members(root: Table, tables: FrameTables) -> None:
         }
         group = table.text("group", default=None)
         lengths = [settings[key] for key in ("rigid_start", "rigid_end", "carried")]
-        if len(ends) != 2 or section is None or not np.isfinite(lengths).all():
-            continue
-        if settings["mass"] is None:
-            continue
         name = name or "-".join(ends)
-        if not _is_new(table, tables, "member", name, tables.members):
+        if group is not None:
+            tables.groups.setdefault(group, []).append(name)
+        good = len(ends) == 2 and section is not None and settings["mass"] is not None
+        if not _is_new(table, tables, "member", name) or not good:
+            continue
+        if not (np.isfinite(lengths).all() and {*ends} <= {*tables.nodes}):
+            continue
+        if section not in tables.sections:
             continue
         member = Member(*ends, section, section, **settings)
         try:
@@ -176,8 +186,6 @@ def _read_members(root: Table, tables: FrameTables) -> None:
             table.fault(None, f"Member {name} {error}")
             continue
         tables.members[name] = member
-        if group is not None:
-            tables.groups.setdefault(group, []).append(name)
 
 
 def _matrices(tables: FrameTables, m: Member):
@@ -188,7 +196,7 @@ def _matrices(tables: FrameTables, m: Member):
 def _read_supports(root: Table, tables: FrameTables) -> None:
     table = root.table("supports")
     for node in table.keys() if table else ():
-        if not table.is_known(node, node, tables.nodes):
+        if not table.is_known(node, node, tables.known("node")):
             continue
         given = table.data[node]
         if isinstance(given, str):
@@ -210,30 +218,30 @@ def _read_masses(root: Table, tables: FrameTables) -> None:
             (f"{node}.rotation", table.number("I", "kg m^2", 0.0, least=0)),
         ]
         name = table.text("name", default=f"mass {node}")
-        if node not in tables.nodes:
+        if node not in tables.known("node"):
             table.fault(None, _unknown_node("A mass stands at", node, tables))
-        elif name and _is_new(table, tables, "mass", name, tables.masses):
+        elif name and _is_new(table, tables, "mass", name):
             tables.masses[name] = tuple((dof, mass) for dof, mass in pairs if mass)
 
 
 def _unknown_node(start: str, node: str, tables: FrameTables) -> str:
-    return f"{start} node {node!r}, which is unknown: {nearest(node, tables.nodes)}."
+    return f"{start} node {node!r}, which is unknown: {nearest(node, tables.known('node'))}."
 
 
 def _read_relations(root: Table, tables: FrameTables) -> None:
     for table in root.entries("diaphragms"):
-        nodes = table.texts("nodes", tables.nodes)
+        nodes = table.texts("nodes", tables.known("node"))
         direction = table.text("direction", ["x", "y"], "x")
         if len(nodes) > 1 and direction:
             tables.relations += diaphragm(nodes, direction)
         elif isinstance(table.data.get("nodes"), list) and len(table.data["nodes"]) < 2:
             table.wrong("nodes", "be a list of at least two nodes")
     for table in root.entries("rigid_links"):
-        leader = table.text("leader", tables.nodes)
-        followers = table.texts("followers", tables.nodes)
+        leader = table.text("leader", tables.known("node"))
+        followers = table.texts("followers", tables.known("node"))
         if leader in followers:
             table.wrong("followers", f"be other nodes than the leader, {leader}")
-        elif leader:
+        elif leader and table.document.good:
             tables.relations += rigid_link(tables.nodes, leader, *followers)
     for table in root.entries("constraints"):
         _read_constraint(table, tables)
@@ -241,7 +249,7 @@ def _read_relations(root: Table, tables: FrameTables) -> None:
 
 def _read_constraint(table: Table, tables: FrameTables) -> None:
     """One relation; its coefficients have the unit of a length where translations meet turns."""
-    known = [*tables.dofs, *(f"{node}.r" for node in tables.nodes)]
+    known = [*tables.dofs, *(f"{node}.r" for node in tables.known("node"))]
     follower = table.text("dof", known)
     terms = table.table("equals")
     if terms is None:

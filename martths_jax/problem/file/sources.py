@@ -105,9 +105,9 @@ def read_frame_form(document: Document) -> Whole | None:
     """A frame of the tables, or of an OpenSees model with what the tables add."""
     root = document.root
     tables = read_frame(document, _read_opensees(document))
-    known = [*tables.members, *tables.groups, *tables.masses]
+    known = [*tables.known("member"), *tables.groups, *tables.known("mass")]
     for name in tables.groups:
-        if name in tables.members or name in tables.masses:
+        if name in (*tables.known("member"), *tables.known("mass")):
             document.fault(("members",), f"The name {name!r} stands for a group and another part.")
     laboratory = root.texts("laboratory", known, ())
     supported = [f"{node}.{d}" for node, found in tables.supports.items() for d in found]
@@ -190,7 +190,12 @@ def _read_opensees(document: Document) -> FrameTables | None:
     tables.members, tables.supports = model.members, model.supports
     tables.masses = {f"mass {node}": pairs for node, pairs in model.masses.items()}
     tables.relations = model.relations
-    tables.where = {("node", node): (*table.path, "file") for node in model.nodes}
+    place = (*table.path, "file")
+    for kind, names in (
+        ("node", model.nodes), ("section", model.sections), ("member", model.members),
+        ("mass", tables.masses),
+    ):  # fmt: skip
+        tables.where |= {(kind, name): place for name in names}
     return tables
 
 

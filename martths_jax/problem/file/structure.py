@@ -99,6 +99,7 @@ def read_structure(document: Document) -> StructureData | None:
         return None
     with document.blame(whole.place):
         check_definite(whole.K, whole.dofs)
+        _check_mass(whole)
     if not document.good:
         return None
     with document.blame(("laboratory",) if matrices is None else ("laboratory_matrices",)):
@@ -119,6 +120,16 @@ def load_structure(path: Path | str) -> StructureData:
     document.finish()
     assert data is not None
     return data
+
+
+def _check_mass(whole: Whole) -> None:
+    """Refuse a mass that is negative in some motion, or none at all."""
+    size = np.diag(np.abs(np.diag(whole.M)))
+    negative = negative_directions(whole.M, size, whole.dofs)
+    if negative:
+        raise InputError(f"The mass is negative in the motion of {', '.join(negative)}.")
+    if not massive(whole.M).size:
+        raise InputError("Nothing has mass: M is zero.")
 
 
 class _Building:
@@ -191,6 +202,8 @@ class _Building:
         with self.document.blame(("damping",)):
             C = R.T @ whole.C @ R if damping is None else damping.matrix(self.M, self.K)
             self._check_damping(C, dofs)
+        if not self.document.good:
+            return None
         with self.document.blame(("laboratory_damping",)):
             C_L = self._laboratory_damping(damping, laboratory_damping)
         if not self.document.good:
