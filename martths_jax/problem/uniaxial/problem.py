@@ -66,7 +66,7 @@ def uniaxial(case: int, loop: Loop = PACKAGE) -> Problem:
         plants=lambda draws, trial, spread: plants.TransferPlants(draws, trial, model, spread),
         draw=partial(plants.draw, model),
         check=plants.check,
-        readings={"values": Reading("_value", partial(_draws, model))},
+        readings={"values": Reading("_value", model.uncertainty.draws)},
         stored=("plant_value", "uncertain parameters of the plant: a3, b1 [1/s], b2 [1/s2], "
                 "k_e [N/m]", "SI"),
         noise=_noise,
@@ -79,11 +79,6 @@ def uniaxial(case: int, loop: Loop = PACKAGE) -> Problem:
 
 def _noise(power: float, shared: bool, seed: int) -> SensorNoise:
     return SensorNoise(power, shared, seed, actuators=1, load_cells=1, force_power=NOISE_N2)
-
-
-def _draws(model, values: np.ndarray, spread: float) -> np.ndarray:
-    uncertain = model.uncertainty
-    return (values - np.array(uncertain.nominal)) / (np.array(uncertain.sigmas) * spread)
 
 
 def _build(
