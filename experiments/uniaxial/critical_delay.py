@@ -11,9 +11,14 @@ from uniaxial_loop import Loop, Rules, numerical
 
 
 def receptance(case, s, rules=Rules()):
-    """(specimen's dynamic stiffness) x (numerical substructure's flexibility at storey 1) at s."""
+    """Specimen's dynamic stiffness x flexibility of the numerical substructure at storey 1, at s.
+
+    s (n,) [rad/s] -> (n,).
+    """
     c, (M, C, K) = rules.constants, numerical(case, rules)
-    return (c.m_e * s**2 + c.c_e * s + c.k_e) * np.linalg.inv(M * s**2 + C * s + K)[0, 0]
+    at = np.asarray(s)[:, None, None]
+    flexibility = np.linalg.inv(M * at**2 + C * at + K)[:, 0, 0]
+    return (c.m_e * s**2 + c.c_e * s + c.k_e) * flexibility
 
 
 def critical_delays(case, rules=Rules()):
@@ -22,17 +27,18 @@ def critical_delays(case, rules=Rules()):
     |H| = 1 fixes omega, the phase then fixes the smallest tau.  The smallest of all is the critical
     delay: without delay the loop is the reference structure, which is stable.
     """
-    f = np.arange(0.05, 100, 0.01)
+
+    def at(f):
+        return receptance(case, 2j * np.pi * np.atleast_1d(f), rules)
 
     def excess(f):
-        return abs(receptance(case, 2j * np.pi * f, rules)) - 1
+        return abs(at(f)[0]) - 1
 
-    values = np.array([excess(x) for x in f])
-    found = []
-    for i in np.flatnonzero(values[1:] * values[:-1] < 0):
+    f = np.arange(0.05, 100, 0.01)
+    above, found = abs(at(f)) > 1, []
+    for i in np.flatnonzero(above[1:] != above[:-1]):
         root = brentq(excess, f[i], f[i + 1])
-        phase = np.angle(-receptance(case, 2j * np.pi * root, rules)) % (2 * np.pi)
-        found.append((phase / (2 * np.pi * root), root))
+        found.append((np.angle(-at(root)[0]) % (2 * np.pi) / (2 * np.pi * root), root))
     return sorted(found)
 
 
