@@ -11,7 +11,17 @@ import typer
 from rich.markup import escape
 
 from martths_jax import __version__
-from martths_jax.cli import export, figures, motions, nominal, sensitivity, study, sweep, tune
+from martths_jax.cli import (
+    export,
+    figures,
+    motions,
+    nominal,
+    problem,
+    sensitivity,
+    study,
+    sweep,
+    tune,
+)
 from martths_jax.cli.console import accept_any_text, error_console
 from martths_jax.errors import InputError
 from martths_jax.runtime import check_devices
@@ -37,6 +47,7 @@ app.command("table")(figures.table)
 app.command("report")(figures.report)
 app.command("replay")(figures.replay)
 app.add_typer(motions.app, name="motions")
+app.add_typer(problem.app, name="problem")
 
 
 def _print_version(wanted: bool) -> None:
