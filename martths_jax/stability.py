@@ -92,7 +92,13 @@ def spectral_radius(benchmark: Benchmark, controller: Controller, plants: Plants
 
     Arguments as in ``linear_loop``.
     """
-    A = np.asarray(linear_loop(benchmark, controller, plants))
+    return radius_of(linear_loop(benchmark, controller, plants))
+
+
+def radius_of(A) -> np.ndarray:
+    """(T,) largest magnitude of the eigenvalues of (T, n, n) matrices; NaN for those of a matrix
+    that is not finite."""
+    A = np.asarray(A)
     radius = np.full(len(A), np.nan)
     finite = np.isfinite(A).all(axis=(1, 2))
     radius[finite] = np.abs(np.linalg.eigvals(A[finite])).max(axis=1)
@@ -139,12 +145,23 @@ def delay_margin(
     Returns:
         (T,) delay [ms]; 0 where the loop is unstable without any, inf where none is found.
     """
-    stable = spectral_radius(benchmark, controller, plants) < 1
     matrices = linear_loop(benchmark, controller, plants, opened=True)
-    omega = 2 * np.pi * np.geomspace(0.05, 0.5 * benchmark.fs, points)
+    return margin_of(*matrices, benchmark.dt, points=points)
+
+
+def margin_of(A, B, C, dt: float, *, points: int = 4000) -> np.ndarray:
+    """``delay_margin`` of loops that are there: ``linear_loop`` with `opened`.
+
+    Args:
+        A, B, C: (T, n, n), (T, n, 2), (T, 2, n).
+        dt: sample period [s].
+        points: as of ``delay_margin``.
+    """
+    stable = radius_of(A + B @ C) < 1
+    omega = 2 * np.pi * np.geomspace(0.05, 0.5 / dt, points)
     return np.array(
         [
-            _edge(*(np.asarray(m[i]) for m in matrices), omega, benchmark.dt) if good else 0.0
+            _edge(*(np.asarray(m[i]) for m in (A, B, C)), omega, dt) if good else 0.0
             for i, good in enumerate(stable)
         ]
     )

@@ -26,7 +26,7 @@ FLOORS = (
     ("blocks",),
     ("simulation", "stability"),
     ("nominal", "campaign"),
-    ("study",),
+    ("study", "conformity"),
     ("figures",),
     ("sweep", "sensitivity", "tune"),
     ("report",),
