@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
+from scipy import linalg
 
 from martths_jax.benchmark import Benchmark
 from martths_jax.control.base import Controller
@@ -167,13 +168,24 @@ def margin_of(A, B, C, dt: float, *, points: int = 4000) -> np.ndarray:
     )
 
 
+def response(A, B, C, z: np.ndarray) -> np.ndarray:
+    """(W, o, i) response C (z I - A)^-1 B at (W,) points z.
+
+    With A = Q S Q^H, S upper triangular (complex Schur form), each point takes a back substitution.
+    Eigenvectors would not do: past samples that are kept are a chain of poles at zero, which has
+    one eigenvector only.
+    """
+    S, Q = linalg.schur(A, output="complex")
+    right = Q.conj().T @ B
+    x = np.zeros((len(z), *right.shape), complex)
+    for i in range(len(S))[::-1]:
+        x[:, i] = (right[i] + S[i, i + 1 :] @ x[:, i + 1 :]) / (z - S[i, i])[:, None]
+    return C @ Q @ x
+
+
 def _edge(A, B, C, omega, dt) -> float:
     """Smallest delay [ms] at which an eigenvalue of the open loop passes through one."""
-    poles, V = np.linalg.eig(A)
-    left, right = C @ V, np.linalg.solve(V, B)
-    z = np.exp(1j * omega * dt)
-    L = (left / (z[:, None, None] - poles)) @ right
-    loci = np.linalg.eigvals(L)
+    loci = np.linalg.eigvals(response(A, B, C, np.exp(1j * omega * dt)))
     # Follow each branch: swap the pair wherever that makes the step between points smaller.
     for i in range(1, len(loci)):
         kept = np.abs(loci[i] - loci[i - 1]).sum()

@@ -6,10 +6,9 @@ import dataclasses
 
 import jax
 
-from martths_jax.conformity.report import Finding
+from martths_jax.conformity.report import Finding, in_words
 from martths_jax.conformity.stand import EAGER, Stand, apart
 from martths_jax.errors import InputError
-from martths_jax.guests import last_line
 from martths_jax.simulation import LANES, prepare
 
 #: What jitted and plain commands may differ by, in parts of the largest one: operations that the
@@ -28,7 +27,7 @@ def structure(stand: Stand) -> Finding:
     except InputError as error:
         return Finding(name, False, None, str(error))
     except Exception as error:  # the user's code may raise anything
-        return Finding(name, False, None, f"Preparing it ends in {last_line(error)}.")
+        return Finding(name, False, None, f"Preparing it ends in {in_words(error)}.")
     return Finding(
         name, True, leaves, "State, records and commands keep their structure, shapes and types.",
         "arrays of state",
@@ -107,7 +106,7 @@ def jit_alike(stand: Stand) -> Finding:
     except Exception as error:  # the user's code may raise anything
         return Finding(
             name, False, None,
-            f"Without jit, `step` ends in {last_line(error)}; let it work on ordinary arrays, too, "
+            f"Without jit, `step` ends in {in_words(error)}; let it work on ordinary arrays, too, "
             "which is how it is called for a look at single samples.",
         )  # fmt: skip
     jitted = stand.second[: len(plain)]

@@ -108,5 +108,11 @@ class Report:
         }  # fmt: skip
 
 
+def in_words(error: Exception) -> str:
+    """An error of a user's code: its kind, and the first line of what it says."""
+    first = next(iter(str(error).strip().splitlines()), "").rstrip(".")
+    return f"{type(error).__name__} ({first[:160]})" if first else type(error).__name__
+
+
 def _plain(value: float | None) -> float | str | None:
     return str(value) if value is not None and not math.isfinite(value) else value

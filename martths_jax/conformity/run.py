@@ -12,11 +12,10 @@ from martths_jax.checks import motion_problems
 from martths_jax.conformity import batch, closed, protocol, slopes
 from martths_jax.conformity.cost import cost
 from martths_jax.conformity.memory import memory
-from martths_jax.conformity.report import Finding, Report
+from martths_jax.conformity.report import Finding, Report, in_words
 from martths_jax.conformity.stand import Stand
 from martths_jax.control.base import Controller
 from martths_jax.errors import argument_error, check_seed, raise_all
-from martths_jax.guests import last_line
 from martths_jax.motions import BUILTIN_NAMES, Motion, load_motion
 from martths_jax.published import COMPARED
 from martths_jax.runtime import check_runtime
@@ -49,20 +48,21 @@ class Check:
     loop: bool = False
 
 
-_BITS = ("structure", "outside state", "trials")
+_SOUND = ("structure", "outside state")
+_CAUSAL, _APART = (*_SOUND, "causal"), (*_SOUND, "trials")
 CHECKS = (
     Check(("structure",), protocol.structure, ()),
     Check(("outside state",), memory, ("structure",)),
     Check(("one trace",), protocol.one_trace),
     Check(("causal",), batch.causal),
     Check(("trials",), batch.independent),
-    Check(("nan",), batch.contained, _BITS),
-    Check(("jit",), protocol.jit_alike),
+    Check(("nan",), batch.contained, _APART),
+    Check(("jit",), protocol.jit_alike, _CAUSAL),
     Check(("gradient",), slopes.gradient),
     Check(("cost",), _beside),
-    Check(("causal loop",), closed.causal_loop, ("structure", "outside state", "causal"), True),
+    Check(("causal loop",), closed.causal_loop, _CAUSAL, True),
     Check(("lost",), closed.lost, loop=True),
-    Check(("volts",), closed.volts, ("structure", "outside state", "lost"), True),
+    Check(("volts",), closed.volts, (*_SOUND, "lost"), True),
     Check(("radius", "margin"), closed.stability, loop=True),
 )
 
@@ -141,6 +141,6 @@ def _findings(one: Check, stand: Stand, before: dict, quick: bool) -> tuple[Find
     try:
         found = one.run(stand)
     except Exception as error:  # the user's code may raise anything, and the others still count
-        told = f"It ends in {last_line(error)}."
+        told = f"It ends in {in_words(error)}."
         return tuple(Finding(name, False, None, told) for name in one.names)
     return found if isinstance(found, tuple) else (found,)

@@ -6,9 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from martths_jax.conformity.report import Finding
+from martths_jax.conformity.report import Finding, in_words
 from martths_jax.conformity.stand import Drive, Stand, drive
-from martths_jax.guests import last_line
 
 #: Trials that are differentiated.
 TRIALS = 2
@@ -43,7 +42,7 @@ def gradient(stand: Stand) -> Finding:
     except Exception as error:  # the user's code may raise anything
         return Finding(
             NAME, False, None,
-            f"It cannot be made of traced {', '.join(values)}: {last_line(error)}; let its class "
+            f"It cannot be made of traced {', '.join(values)}: {in_words(error)}; let its class "
             "and `prepare` take them as JAX's arrays, or give the entry `traced`.",
         )  # fmt: skip
     strokes = [jnp.asarray(x[..., :TRIALS]) for x in stand.strokes]
