@@ -1,6 +1,8 @@
 """What passes, what is reported, and what the checks drive a controller with."""
 
 import json
+import re
+from pathlib import Path
 
 import jax
 import numpy as np
@@ -124,6 +126,16 @@ def test_arguments_that_cannot_be_used(benchmark):
         check("lqg", benchmark, motion=burst(fs=512))
     with pytest.raises(InputError, match=r"Controller 'adfx' is unknown; the nearest are adfc"):
         check("adfx", benchmark)
+
+
+def test_the_page_lists_the_checks():
+    page = (Path(__file__).parents[2] / "docs" / "controllers.md").read_text("utf-8")
+    section = page.partition("## Check yours")[2].partition("\n## ")[0]
+    table = section.partition("| check | what is asked |")[2]
+    assert re.findall(r"^\| `([^`]+)` \|", table, re.MULTILINE) == NAMES
+    words = r"^([a-z]+(?: [a-z]+)?) {2,}(?:passed|FAILED|not judged) "
+    shown = re.findall(words, section, re.MULTILINE)
+    assert shown == NAMES
 
 
 def told(*words):
