@@ -27,7 +27,7 @@ FLOORS = (
     ("problem",),
     ("simulation", "stability"),
     ("nominal", "campaign"),
-    ("study",),
+    ("study", "conformity"),
     ("figures",),
     ("sweep", "sensitivity", "tune"),
     ("report",),

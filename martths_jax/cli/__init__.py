@@ -12,6 +12,7 @@ from rich.markup import escape
 
 from martths_jax import __version__
 from martths_jax.cli import (
+    check_controller,
     export,
     figures,
     motions,
@@ -43,6 +44,7 @@ app.command("sweep")(sweep.sweep)
 app.command("sensitivity")(sensitivity.sensitivity)
 app.command("figures")(figures.figures)
 app.command("tune")(tune.tune)
+app.command("check-controller")(check_controller.check_controller)
 app.command("table")(figures.table)
 app.command("report")(figures.report)
 app.command("replay")(figures.replay)
