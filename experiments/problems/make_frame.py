@@ -21,7 +21,8 @@ from martths_jax.transfer import FRAME_POLE_HZ, NOMINAL_GAIN, NOMINAL_HZ
 STOREY = 0.80
 LABORATORY = ("column base 2-4", "column base 3-7", "beam 4-7")
 #: Zeros and poles of H_ij, by the names of the uncertain parameters.
-ZEROS = [[("zero1_col1", "zero2_col1"), ("zero_h12",)], [("zero1_col1", "zero2_col1"), ("zero_h22",)]]
+COLUMN_1 = ("zero1_col1", "zero2_col1")
+ZEROS = [[COLUMN_1, ("zero_h12",)], [COLUMN_1, ("zero_h22",)]]
 POLES = [("pole1_col1", "pole2_col1"), ("pole1_col2", "pole2_col2")]
 
 
@@ -42,16 +43,20 @@ def frame_tables() -> list[str]:
     for name, m in frame.members.items():
         more = f", rigid_end = {m.rigid_end!r}" if m.rigid_end else ""
         more += f", release = {quoted(m.release)}" if m.release else ""
-        lines.append(f'"{name}" = {{ends = {quoted([m.start, m.end])}, section = "{m.section}"{more}}}')
+        ends = quoted([m.start, m.end])
+        lines.append(f'"{name}" = {{ends = {ends}, section = "{m.section}"{more}}}')
     lines.append("\n[supports]")
     lines += [f'"{n}" = {quoted(d.replace("rotation", "r") for d in held)}'
               for n, held in frame.supports.items()]  # fmt: skip
     for relation in frame.constraints:
         terms = ", ".join(f'"{dof}" = {value!r}' for dof, value in relation.terms.items())
         lines += ["", "[[constraints]]", f'dof = "{relation.follower}"', f"equals = {{{terms}}}"]
+    masses: dict[str, list[str]] = {}
     for dof, mass in frame.masses.items():
         node, _, direction = dof.rpartition(".")
-        lines += ["", "[[masses]]", f'node = "{node}"', f"m_{direction} = {mass!r}"]
+        masses.setdefault(node, []).append(f"m_{direction} = {mass!r}")
+    for node, numbers in masses.items():
+        lines += ["", "[[masses]]", f'node = "{node}"', *numbers]
     return lines
 
 
@@ -60,8 +65,8 @@ def rig_tables() -> list[str]:
     arm, alpha = float(coupler.arm), float(coupler.alpha)
     lines = []
     for i, sign in ((0, -1), (1, 1)):
-        at = [arm * np.cos(alpha), sign * arm * np.sin(alpha)]
-        lines += ["", "[[actuators]]", f'name = "{i + 1}"', 'node = "4"', f"attachment = {at}".replace("np.float64", ""),
+        at = f"[{arm * np.cos(alpha):.12g}, {sign * arm * np.sin(alpha):.12g}]"
+        lines += ["", "[[actuators]]", f'name = "{i + 1}"', 'node = "4"', f"attachment = {at}",
                   "direction = [1.0, 0.0]", f"volt_per_mm = {valves.volt_per_mm[i]!r}",
                   f"volt_offset = {valves.volt_offset[i]!r}"]  # fmt: skip
     lines += ["", "[valves]", f"limit = {valves.limit}", "", "[sensors]", "noise_power = 1.5e-7",
@@ -72,18 +77,19 @@ def rig_tables() -> list[str]:
             lines += ["", "[[plant]]", f'output = "{i + 1}"', f'input = "{j + 1}"',
                       f"zeros = {quoted(ZEROS[i][j])}",
                       f"poles = {quoted(POLES[j])[:-1]}, {pair}]",
-                      f"gain = {NOMINAL_GAIN[i, j]!r}".replace("np.float64", "").replace("(", "").replace(")", ""),
+                      f"gain = {float(NOMINAL_GAIN[i, j])}",
                       'gain_as = "nominal"']  # fmt: skip
     lines += ["", "[uncertain]"]
     for name, value, sigma in zip(PARAMETERS, NOMINAL_HZ, SIGMA, strict=True):
         unit = "1" if value == 1 else "Hz"
-        lines.append(f'{name} = {{nominal = {float(value)}, sigma = {float(sigma)}, unit = "{unit}"}}')
+        numbers = f"nominal = {float(value)}, sigma = {float(sigma)}"
+        lines.append(f'{name} = {{{numbers}, unit = "{unit}"}}')
     return lines
 
 
 def main() -> None:
     head = [
-        "# Written by make_frame.py: the maRTHS benchmark's frame, storeys of 0.80 m, 0.635 m there.",
+        "# Written by make_frame.py: the maRTHS benchmark's frame with storeys of 0.80 m.",
         'units = "SI"', "fs = 1024.0", 'integrator = "newmark"', "",
         f"laboratory = {quoted(LABORATORY)}", 'interface = ["4.x", "4.r"]',
         'outputs = ["4.x", "4.r", "2.x", "3.x"]', 'ground = "x"', "condense = false", "",
