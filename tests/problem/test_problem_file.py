@@ -9,6 +9,8 @@ import pytest
 
 from martths_jax import ADFC, InputError, Passthrough, build_benchmark, simulate
 from martths_jax.benchmark import LAYOUT
+from martths_jax.control.check import check_controller
+from martths_jax.control.controllers import ENTRIES
 from martths_jax.indices import GROUPS, groups_of, indices
 from martths_jax.problem import find_problem
 from martths_jax.problem.file.problem import read_problem
@@ -206,3 +208,24 @@ def test_a_study_keeps_the_file_and_finds_it_again(tmp_path):
     run = RunFolder.open(moved)
     assert run.problem.layout.actuators == ("upper", "lower")
     assert run.draws().plants(jnp.arange(4)).values.shape == (4, 1)
+
+
+ANY_NUMBER = ("adfc", "adfc-rls", "adfc-weighted", "error-model", "mff", "passthrough", "pi-lead")
+
+
+@pytest.mark.parametrize("name", ["loading_unit", "shear_building"])
+def test_controllers_take_any_number_of_actuators_or_say_which(name):
+    """One sample of each on one and three actuators; those made for two say so before anything."""
+    built = find_problem(str(EXAMPLES / f"{name}.toml")).build(1024.0)
+    for entry in ENTRIES:
+        if entry.name == "lqg":  # its default weights are a fit to the maRTHS benchmark
+            weights = {"e": [1e9], "r": [1.0], "y": [1e3]}
+            n = len(built.layout.actuators)
+            made = entry.build(built, q=1e-4, **{k: v * n for k, v in weights.items()})
+        elif entry.name in ANY_NUMBER:
+            made = entry.build(built)
+        else:
+            with pytest.raises(InputError, match="is made for 2 actuators, but the problem has"):
+                entry.build(built)
+            continue
+        check_controller(made.prepare(built), built, 4)
