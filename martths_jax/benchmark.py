@@ -12,12 +12,14 @@ import numpy as np
 from martths_jax.control.base import Estimator
 from martths_jax.coupler import Coupler, build_coupler
 from martths_jax.errors import argument_error
+from martths_jax.layout import Layout, Valves
 from martths_jax.plant import (
     Plants,
     lowest_rate,
     nominal_plant,
     one_plant,
 )
+from martths_jax.rig.specimen import LinearSpecimen, Specimen
 from martths_jax.runtime import check_runtime
 from martths_jax.sensors import SensorNoise
 from martths_jax.structure.experimental import (
@@ -28,7 +30,7 @@ from martths_jax.structure.experimental import (
     measured_frame,
     restoring_maps,
 )
-from martths_jax.structure.frame import FrameGeometry, build_reference
+from martths_jax.structure.frame import FORCE_DOFS, OUTPUT_DOFS, FrameGeometry, build_reference
 from martths_jax.structure.integrators import INTEGRATORS
 from martths_jax.structure.modal import ModalSystem
 from martths_jax.structure.sections import check_positive
@@ -38,10 +40,22 @@ from martths_jax.transfer import NOMINAL_HZ, continuous_modes
 PARTITIONS = ("benchmark", "consistent")
 #: Strokes that the restoring force can be made from, beside those of a filter of one's own.
 FORCE_FROM = ("estimate", "measurement")
-#: Volts of the two valves: u [mm] / gain + offset (only monitored), and their limit.
-VOLT_PER_MM = np.array([1 / (7.4921 * 1.053), 1 / (7.3907 * 1.055)])
-VOLT_OFFSET = np.array([-0.0092 / 7.4921, 0.0059 / 7.3907])
-VOLT_LIMIT = 3.8
+#: The benchmark's names and sizes; the coupler has no position for strokes 254 mm apart, and the
+#: largest stroke of the study is about a tenth of what counts as run away.
+LAYOUT = Layout(
+    actuators=("1", "2"),
+    interface=("4", "28"),
+    outputs=tuple(str(dof) for dof in OUTPUT_DOFS),
+    forces=tuple(str(dof) for dof in FORCE_DOFS),
+    valves=Valves(
+        volt_per_mm=(1 / (7.4921 * 1.053), 1 / (7.3907 * 1.055)),
+        volt_offset=(-0.0092 / 7.4921, 0.0059 / 7.3907),
+        limit=3.8,
+    ),
+    paper="Condori Uribe et al. 2023",
+)
+#: Valve command that counts as saturated [V].
+VOLT_LIMIT = LAYOUT.valves.limit
 
 
 @jax.tree_util.register_dataclass
@@ -53,7 +67,7 @@ class Benchmark:
         fs: sampling rate [Hz].
         numerical: numerical substructure, inputs (a_g, f_1, f_2, f_3), outputs ``OUTPUT_DOFS``.
         reference: reference structure, the same inputs and outputs.
-        restoring: (3, 3, 2) taps of the restoring force, see ``restoring_maps``.
+        specimen: what answers the interface motion with a force, see ``rig.specimen``.
         coupler: geometry between actuators and interface.
         plant_model: the plant that controllers and filters are designed for, discretised.
         plant_continuous: (A, B, C) of that plant, states slot by slot.
@@ -62,13 +76,14 @@ class Benchmark:
         force_from: strokes that the restoring force is made from: the controller's ``estimate``,
             the ``measurement`` or those of the own ``filter``.
         integrator, partition: names of the methods used.
+        layout: names and sizes.
     """
 
     fs: float = field(metadata={"static": True})
     numerical: ModalSystem
     reference: ModalSystem
-    restoring: jax.Array
-    coupler: Coupler
+    specimen: Specimen
+    coupler: Any
     plant_model: ModalSystem
     plant_continuous: tuple
     noise_power: float
@@ -76,6 +91,7 @@ class Benchmark:
     force_from: str = field(default="estimate", metadata={"static": True})
     integrator: str = field(default="newmark", metadata={"static": True})
     partition: str = field(default="benchmark", metadata={"static": True})
+    layout: Layout = field(default=LAYOUT, metadata={"static": True})
 
     @property
     def dt(self) -> float:
@@ -149,7 +165,7 @@ def build_benchmark(
         fs=float(fs),
         numerical=systems[0],
         reference=systems[1],
-        restoring=jnp.asarray(restoring_maps(experimental, dt)),
+        specimen=LinearSpecimen(jnp.asarray(restoring_maps(experimental, dt))),
         coupler=coupler or build_coupler(),
         plant_model=plant.discretise(dt),
         plant_continuous=continuous_plant(plant),
@@ -229,9 +245,3 @@ def continuous_plant(plant: Plants | None = None) -> tuple[np.ndarray, np.ndarra
         C[:, at : at + 2] = real_residue[:, j]
         C[:, at + 2], C[:, at + 3] = 2 * frame_residue[:, j].real, -2 * frame_residue[:, j].imag
     return A, B, C
-
-
-def command_volts(u: jax.Array) -> jax.Array:
-    """Valve commands [V] of (2, ...) commands [mm] (benchmark's sensor calibration)."""
-    shape = (2,) + (1,) * (u.ndim - 1)
-    return u * VOLT_PER_MM.reshape(shape) + VOLT_OFFSET.reshape(shape)

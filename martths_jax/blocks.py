@@ -18,6 +18,7 @@ from martths_jax.benchmark import Benchmark
 from martths_jax.control.controllers import Controller
 from martths_jax.indices import BENCHMARK, Index, IndexSums, join_sums, observers_of
 from martths_jax.indices.delay import ATTEMPTS
+from martths_jax.layout import Layout
 from martths_jax.observers import Counts, Keep, Observer
 from martths_jax.runtime import compiler_options
 from martths_jax.sensors import SensorNoise, unit_noise
@@ -44,7 +45,7 @@ class Setup:
         controller: prepared controller; leaves marked in `per_trial` end in an axis of trials.
         per_trial: for each leaf of `controller`, whether it is marked.
         ground: (N,) ground acceleration [m/s^2].
-        reference: (N, 6) response of the reference structure.
+        reference: (N, o) response of the reference structure.
     """
 
     benchmark: Benchmark
@@ -64,10 +65,10 @@ class Ran(NamedTuple):
 
 
 def observers(
-    controller: Controller, kinds: tuple[Observer, ...], keep: int
+    layout: Layout, controller: Controller, kinds: tuple[Observer, ...], keep: int
 ) -> tuple[Observer, ...]:
     """What looks at a run: the indices' observers, watch, the controller's counts, kept signals."""
-    return (*kinds, watching.Watcher(), Counts.of(controller), Keep(keep, LEFT_OUT))
+    return (*kinds, watching.Watcher(layout), Counts.of(controller), Keep(keep, LEFT_OUT))
 
 
 def ran(indices, kinds, states, emitted) -> Ran:
@@ -88,7 +89,9 @@ def run_traced(setup: Setup, plants, noise, keep: bool, indices: tuple[Index, ..
         setup.reference,
         draw_noise(noise, plants.trial, samples, fs),
         trials=len(plants),
-        observers=observers(setup.controller, kinds, len(plants) if keep else 0),
+        observers=observers(
+            setup.benchmark.layout, setup.controller, kinds, len(plants) if keep else 0
+        ),
     )
     found = ran(indices, kinds, states, emitted)
     return found._replace(signals=jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), found.signals))
@@ -237,7 +240,7 @@ def compiled(
             reference,
             noise,
             trials=LANES,
-            observers=observers(controller, kinds, kept),
+            observers=observers(benchmark.layout, controller, kinds, kept),
             samples=samples,
         )
         found = ran(indices, kinds, states, emitted)
@@ -295,7 +298,7 @@ def draw_on(devices, noise: SensorNoise, trial: np.ndarray, samples: int, fs: fl
         (``room_for(N)``, 1 or 2, T), zeros beyond N: as ``run_block`` needs it, without a copy.
     """
     program = noise_program(tuple(devices), samples, noise.channels)
-    return program(jnp.asarray(trial), noise.seed, noise.noise_power * fs)
+    return program(jnp.asarray(trial), noise.seed, noise.variances(fs))
 
 
 @lru_cache(maxsize=16)

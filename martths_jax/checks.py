@@ -7,16 +7,16 @@ from collections.abc import Sequence
 import jax
 import numpy as np
 
-from martths_jax.benchmark import Benchmark
+from martths_jax.benchmark import LAYOUT, Benchmark
 from martths_jax.control.adaptive.inverse import BAND_HZ
 from martths_jax.control.controllers import Controller
 from martths_jax.errors import InputError, argument_error, raise_all
+from martths_jax.layout import Layout
 from martths_jax.motions import Motion
 from martths_jax.plant import IdealPlants, Plants
 from martths_jax.resources import available_memory
 from martths_jax.sensors import SensorNoise
 from martths_jax.structure.modal import ModalSystem, to_dense
-from martths_jax.transfer import frequency_response
 
 #: Numbers a sample and trial that ``keep=True`` stores, ADFC's coefficients among them.
 KEPT_NUMBERS = 36
@@ -51,7 +51,7 @@ def check_simulation(benchmark, controller, plants, motion, noise, keep=False, p
     found = motion_problems(motion, benchmark.fs if whole else None)
     samples = None if found else int(np.size(motion.acceleration))
     problems += found
-    problems += noise_problems(noise, trials, samples)
+    problems += noise_problems(noise, trials, samples, benchmark.layout if whole else LAYOUT)
     problems += controller_problems(controller, benchmark if whole else None, trials)
     expect(isinstance(keep, (bool, np.bool_)), "keep", "be True or False", repr(keep))
     expect(progress is None or callable(progress), "progress", "be callable", _kind(progress))
@@ -139,7 +139,7 @@ def _nearest(plants: Plants, model: ModalSystem, fs: float) -> float:
     few = np.linspace(0, len(plants) - 1, PICKED).round().astype(int)
     few = jax.tree.map(lambda x: np.asarray(x)[few] if np.ndim(x) else float(x), plants)
     hold = ((1 - np.exp(-s)) / s)[:, None, None, None]
-    theirs = np.moveaxis(hold * frequency_response(few.parameters_hz, f), -1, 0)
+    theirs = np.moveaxis(hold * few.frequency_response(f)[:, : len(known[0])], -1, 0)
     apart = np.linalg.norm(theirs - known, axis=(2, 3)) / np.linalg.norm(known, axis=(1, 2))
     return float(np.min(np.max(apart, axis=1)))
 
@@ -176,7 +176,9 @@ def motion_problems(motion, fs: float | None) -> list[str]:
     return problems
 
 
-def noise_problems(noise, trials: int | None, samples: int | None) -> list[str]:
+def noise_problems(
+    noise, trials: int | None, samples: int | None, layout: Layout = LAYOUT
+) -> list[str]:
     """Sentences about noise that does not fit a run of so many trials and samples.
 
     A number that is not known (None), because its argument has problems of its own, fits.
@@ -184,11 +186,15 @@ def noise_problems(noise, trials: int | None, samples: int | None) -> list[str]:
     if noise is None or isinstance(noise, SensorNoise) or not _known(noise):
         return []
     size = [("trials" if trials is None else trials), ("N" if samples is None else samples)]
-    wanted = f"be a SensorNoise or an array ({size[1]}, 2) or ({size[0]}, {size[1]}, 2) in mm"
+    n = layout.plant_outputs
+    units = "mm and N" if layout.load_cells else "mm"
+    wanted = (
+        f"be a SensorNoise or an array ({size[1]}, {n}) or ({size[0]}, {size[1]}, {n}) in {units}"
+    )
     if not isinstance(noise, (np.ndarray, jax.Array)):
         return [str(argument_error("noise", wanted, _kind(noise)))]
     shape = noise.shape
-    good = len(shape) in (2, 3) and shape[-1] == 2
+    good = len(shape) in (2, 3) and shape[-1] == n
     good = good and (len(shape) == 2 or trials is None or shape[0] == trials)
     if not good or (samples is not None and shape[-2] < samples):
         return [str(argument_error("noise", wanted, f"shape {shape}"))]

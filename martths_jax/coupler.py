@@ -32,6 +32,14 @@ class Coupler:
     arm: jax.Array
     alpha: jax.Array
 
+    def to_actuators(self, interface: jax.Array) -> jax.Array:
+        """(2, T) strokes [mm] of an interface motion (2, T) [m, rad]."""
+        return frame_to_actuator(self, interface)
+
+    def to_frame(self, strokes_mm: jax.Array) -> jax.Array:
+        """(2, T) interface motion [m, rad] of strokes (2, T) [mm]."""
+        return actuator_to_frame(self, strokes_mm)
+
 
 def build_coupler(
     arm: float = float(np.hypot(0.26670, 0.127)), alpha_deg: float = 25.4633

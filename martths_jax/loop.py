@@ -17,10 +17,10 @@ import jax.numpy as jnp
 from martths_jax.benchmark import Benchmark
 from martths_jax.control.base import Controller, DelayLine
 from martths_jax.control.compensator import Compensator, CompensatorState
-from martths_jax.coupler import actuator_to_frame, frame_to_actuator
+from martths_jax.layout import Layout
 from martths_jax.observers import Observer
-from martths_jax.once import once
-from martths_jax.structure.modal import ModalSystem, advance, contract, output
+from martths_jax.rig.specimen import History
+from martths_jax.structure.modal import ModalSystem, advance, output
 
 #: Length of the time loop's windows for controllers that keep none [samples].
 WINDOW = 1024
@@ -38,13 +38,15 @@ class LoopState:
         plant: (2, m, T) state of the plants.
         compensator: state of estimator and controller.
         force_path: prediction of the force path's own filter for k; None without one.
-        interface: (2, 2, T) interface motion that the force was made from at k-1 and k-2.
+        specimen: state of the specimen.
+        interface: (2, d, T) interface motion that the force was made from at k-1 and k-2.
     """
 
     structure: jax.Array
     plant: jax.Array
     compensator: CompensatorState
     force_path: Any
+    specimen: Any
     interface: jax.Array
 
 
@@ -59,7 +61,8 @@ def initial_state(
         plant=at_rest(plant),
         compensator=compensator.init_served(trials),
         force_path=None if own is None else own.init(trials),
-        interface=jnp.zeros((2, 2, trials)),
+        specimen=benchmark.specimen.init(trials),
+        interface=jnp.zeros((2, len(benchmark.layout.interface), trials)),
     )
 
 
@@ -76,28 +79,35 @@ def sample_period(
 
     Args:
         ground: ground acceleration at k [m/s^2], a scalar.
-        noise: (1 or 2, T or 1) sensor noise at k [mm].
+        noise: (rows, T or 1) sensor noise at k [mm], one row for all sensors or one each; then that
+            of the load cells [N], where there are some.
         delayed: what comes out of the controller's delay line.
 
     Returns:
         state at k + 1, signals at k, the record that goes into the delay line.
     """
     # What the sensors and the filter know of the strokes at k.
-    true = output(plant, state.plant)
-    measured = true + noise
+    layout = benchmark.layout
+    true, loads = parted(layout, output(plant, state.plant))
+    stroke_noise, load_noise = parted_noise(layout, noise)
+    measured = true + stroke_noise
     observed, estimate = compensator.observe(state.compensator, measured)
-    known, felt = felt_strokes(benchmark, state.force_path, measured, estimate)
+    known, felt = felt_strokes(benchmark, state.force_path, true, measured, estimate)
 
-    # Interface motion of those strokes and the force of the experimental frame; its velocity and
-    # acceleration are backward differences, zero at the first sample.
-    interface = actuator_to_frame(benchmark.coupler, felt)
+    # Interface motion of those strokes and the force of the specimen; what it sees before the first
+    # sample is the first, so that it starts without velocity and acceleration.
+    interface = benchmark.coupler.to_frame(felt)
     before = jnp.where(state.compensator.k == 0, interface, state.interface)
-    force = restoring_force(benchmark.restoring, interface, before)
+    history = History(interface, before)
+    if layout.load_cells:
+        specimen, force = state.specimen, loads + load_noise
+    else:
+        specimen, force = benchmark.specimen.step(state.specimen, history, benchmark.dt)
 
     # Numerical substructure under its own inertia and that force.
     load = [ground, *-force]
     numerical = output(benchmark.numerical, state.structure, load)
-    target = frame_to_actuator(benchmark.coupler, numerical[:2])
+    target = benchmark.coupler.to_actuators(numerical[: len(layout.interface)])
 
     box, decision = compensator.decide_served(observed, target, delayed)
     command = decision.u
@@ -108,7 +118,8 @@ def sample_period(
         plant=advance(plant, state.plant, command),
         compensator=box,
         force_path=None if own is None else own.predict(known, command),
-        interface=jnp.stack([interface, before[0]]),
+        specimen=specimen,
+        interface=history.moved(),
     )
     signals = {
         "x_a": target,
@@ -123,36 +134,36 @@ def sample_period(
     return after, signals | decision.signals, decision.record
 
 
-def felt_strokes(benchmark: Benchmark, predicted, measured, estimate) -> tuple[Any, jax.Array]:
-    """Strokes that the restoring force is made from, by the benchmark's ``force_from``.
+def parted(layout: Layout, rows: jax.Array) -> tuple[jax.Array, jax.Array | None]:
+    """Strokes, and the load cells' forces or None, of the rows that a plant gives."""
+    if not layout.load_cells:
+        return rows, None
+    n = len(layout.actuators)
+    return rows[:n], rows[n:]
+
+
+def parted_noise(layout: Layout, rows: jax.Array) -> tuple[jax.Array, jax.Array | None]:
+    """Noise of the strokes, and of the load cells or None."""
+    if not layout.load_cells:
+        return rows, None
+    n = rows.shape[0] - len(layout.forces)
+    return rows[:n], rows[n:]
+
+
+def felt_strokes(benchmark: Benchmark, predicted, true, measured, estimate) -> tuple[Any, Any]:
+    """Strokes that the specimen's force is made from, by the benchmark's ``force_from``.
 
     Args:
         predicted: the force path's own filter's prediction for k, if it has one.
-        measured, estimate: (2, T) x_m(k) and the controller's x_hat(k) [mm].
+        true, measured, estimate: (n, T) x(k), x_m(k) and the controller's x_hat(k) [mm].
 
     Returns:
-        what that filter knows at k, or None; (2, T) strokes [mm].
+        what that filter knows at k, or None; (n, T) strokes [mm].
     """
     if benchmark.force_filter is not None:
         return benchmark.force_filter.correct(predicted, measured)
-    return None, measured if benchmark.force_from == "measurement" else estimate
-
-
-@once
-def restoring_force(taps, interface, before):
-    """Force of the experimental frame.
-
-    Args:
-        taps: (3, 3, 2) on the motion at k, k-1 and k-2.
-        interface: (2, T) motion at k [m, rad].
-        before: (2, 2, T) motion at k-1 and k-2.
-
-    Returns:
-        (3, T) force on floor-1 x [N], moments on nodes 4 and 7 [N m].
-    """
-    force = contract(taps[0], interface)
-    force = contract(taps[1], before[0], start=force)
-    return contract(taps[2], before[1], start=force)
+    sources = {"measurement": measured, "estimate": estimate, "stroke": true}
+    return None, sources[benchmark.force_from]
 
 
 def run(
@@ -179,8 +190,8 @@ def run(
         benchmark, controller: what stays; the controller is prepared.
         plant: discretised plants.
         ground: (N,) ground acceleration [m/s^2].
-        reference: (N, 6) response of the reference structure.
-        noise: (N, 1 or 2, T or 1) sensor noise [mm].
+        reference: (N, o) response of the reference structure.
+        noise: (N, rows, T or 1) sensor noise, see ``sample_period``.
         trials: number T of trials in the batch.
         observers: what looks at the run, see ``Observer``.
         samples: length of the motion where `ground`, `reference` and `noise` are padded beyond it;

@@ -100,7 +100,7 @@ def compare_with_table4(
         indices: what is compared, see ``martths_jax.indices.choose``; the benchmark's 24.
     """
     controllers = controllers or [find(n).entry.build(benchmark) for n in published.COMPARED]
-    chosen = choose(indices)
+    chosen = choose(indices, benchmark.layout)
     each: dict[str, dict[str, dict[str, float]]] = {}
     done = 0
     for controller in controllers:

@@ -18,6 +18,7 @@ from martths_jax.transfer import (
     FRAME_POLE_HZ,
     NOMINAL_HZ,
     discretise_parameters,
+    frequency_response,
 )
 
 #: The nine uncertain parameters in the order of the draws.
@@ -66,6 +67,15 @@ class Plants:
         """(T, 9) zeros and poles [Hz]; the frame pair's entry is the factor on the pair."""
         nominal = NOMINAL_HZ[None] if self.nominal_hz is None else self.nominal_hz
         return nominal * (1 + SIGMA[None] * self.spread * self.draws)
+
+    @property
+    def values(self) -> jax.Array:
+        """(T, 9) values of the uncertain parameters: ``parameters_hz``."""
+        return self.parameters_hz
+
+    def frequency_response(self, frequency_hz) -> jax.Array:
+        """(F, 2, 2, T) complex response, see ``transfer.frequency_response``."""
+        return frequency_response(self.parameters_hz, frequency_hz)
 
     def discretise(self, dt: float) -> ModalSystem:
         """Zero-order-hold discretisation of every plant at `dt` [s]."""

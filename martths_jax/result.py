@@ -10,6 +10,7 @@ import numpy as np
 
 from martths_jax import watch as watching
 from martths_jax.indices import IndexSums, on_host, trials_last
+from martths_jax.layout import Layout
 from martths_jax.text import counted
 from martths_jax.watch import Status
 
@@ -36,6 +37,7 @@ class Result:
         trial: (T,) trial numbers.
         fs: sampling rate [Hz].
         motion, controller: names.
+        layout: names and sizes of the problem.
         labels: what is counted, in words, in the order of ``counts``.
     """
 
@@ -48,6 +50,7 @@ class Result:
     fs: float = field(metadata={"static": True})
     motion: str = field(metadata={"static": True})
     controller: str = field(metadata={"static": True})
+    layout: Layout = field(metadata={"static": True})
     labels: tuple[str, ...] = field(default=(), metadata={"static": True})
 
     @property
@@ -65,7 +68,9 @@ class Result:
         """What happened in the trial at `position`: its status, which actuator, from when."""
         watch, sums = trials_last(on_host((self.watch, self.sums)))
         counts = dict(zip(self.labels, on_host(list(self.counts.values())), strict=True))
-        line = watching.describe(watch, sums, range(len(self.trial))[position], self.fs, counts)
+        line = watching.describe(
+            watch, sums, range(len(self.trial))[position], self.fs, self.layout, counts
+        )
         return f"Trial {int(np.asarray(self.trial)[position])} {line}"
 
     def __str__(self) -> str:

@@ -7,6 +7,7 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from martths_jax.errors import argument_error, check_seed
 from martths_jax.runtime import check_precision
@@ -24,13 +25,19 @@ class SensorNoise:
 
     Attributes:
         noise_power: power spectral density [mm^2 s]; a sample's variance is noise_power * fs.
-        shared: both sensors see the same sequence, as in the benchmark; False draws two.
+        shared: all sensors see the same sequence, as in the benchmark; False draws one each.
         seed: seed of the study.
+        actuators: number of displacement sensors.
+        load_cells: number of load cells, each with a sequence of its own.
+        force_power: power spectral density of theirs [N^2 s].
     """
 
     noise_power: float = 1.5e-7
     shared: bool = True
     seed: int = 0
+    actuators: int = 2
+    load_cells: int = 0
+    force_power: float = 0.0
 
     def __post_init__(self):
         try:
@@ -44,12 +51,19 @@ class SensorNoise:
 
     @property
     def channels(self) -> int:
-        """1 if both sensors share a sequence, else 2."""
-        return 1 if self.shared else 2
+        """Rows of the noise: displacement sensors, one row if they share it, then load cells."""
+        return (1 if self.shared else self.actuators) + self.load_cells
 
     def variance(self, fs: float) -> float:
         """Variance of one sample [mm^2]."""
         return self.noise_power * fs
+
+    def variances(self, fs: float):
+        """``variance``; with load cells (channels, 1), theirs [N^2] after it."""
+        if not self.load_cells:
+            return self.variance(fs)
+        strokes = [self.variance(fs)] * (self.channels - self.load_cells)
+        return np.array([*strokes, *[self.force_power * fs] * self.load_cells])[:, None]
 
     def draw(self, trial: jax.Array, samples: int, fs: float) -> jax.Array:
         """Noise of the given trials.
@@ -60,11 +74,11 @@ class SensorNoise:
             fs: sampling rate [Hz].
 
         Returns:
-            (N, channels, T) noise [mm].
+            (N, channels, T) noise [mm, N].
         """
         check_precision()
         unit = unit_noise(self.seed, trial, samples, self.channels)
-        return unit * jnp.sqrt(self.variance(fs))
+        return unit * jnp.sqrt(self.variances(fs))
 
 
 @partial(jax.jit, static_argnames=("samples", "channels"))

@@ -53,8 +53,8 @@ __all__ = [
 
 
 def reference_response(benchmark: Benchmark, acceleration: jax.Array) -> jax.Array:
-    """(N, 6) response of the reference structure to (N,) ground acceleration."""
-    load = jnp.zeros((acceleration.shape[0], 4)).at[:, 0].set(acceleration)
+    """(N, o) response of the reference structure to (N,) ground acceleration."""
+    load = jnp.zeros((acceleration.shape[0], benchmark.layout.inputs)).at[:, 0].set(acceleration)
     return respond(benchmark.reference, load)
 
 
@@ -98,7 +98,7 @@ def simulate(
     """
     check_runtime()
     checks.check_simulation(benchmark, controller, plants, motion, noise, keep, progress)
-    chosen = choose(indices)
+    chosen = choose(indices, benchmark.layout)
     controller, per_trial = prepare(controller, benchmark, len(plants))
     if told := checks.plant_notice(benchmark, controller, plants):
         warnings.warn(told, stacklevel=2)
@@ -115,7 +115,7 @@ def simulate(
     labels = {signal.name: signal.label or signal.name for signal in controller.signals}
     return Result(
         sums, watch, counts, ran.signals, reference, plants.trial, benchmark.fs, motion.name,
-        controller.name, tuple(labels[name] for name in counts),
+        controller.name, benchmark.layout, tuple(labels[name] for name in counts),
     )  # fmt: skip
 
 
@@ -130,11 +130,11 @@ def prepare(controller, benchmark: Benchmark, trials: int) -> tuple[Controller, 
     """
     if isinstance(controller, Controller):
         ready = controller.prepare(benchmark)
-        return ready, check_controller(ready, benchmark.dt, trials)
+        return ready, check_controller(ready, benchmark, trials)
     distinct = {id(c): c for c in checks.check_sequence(controller, trials)}
     ready = {key: c.prepare(benchmark) for key, c in distinct.items()}
     for one in ready.values():
-        check_controller(one, benchmark.dt, 1)
+        check_controller(one, benchmark, 1)
     leaves, trees = zip(*(jax.tree.flatten(c) for c in ready.values()), strict=True)
     checks.check_alike(trees)
     column = {key: i for i, key in enumerate(ready)}

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import permutations
 
 import jax
 import jax.numpy as jnp
@@ -39,11 +40,11 @@ def linear_loop(
         controller: a linear time-invariant one, prepared, such as what ``Controller.frozen`` gives
             (its ``coefficients`` one a trial or shared).
         plants: T of them.
-        opened: cut the loop at the plants' input: v (2 values, mm) drives the plants instead of
+        opened: cut the loop at the plants' input: v (n values, mm) drives the plants instead of
             the command u, while the filter still hears u.  Otherwise v = u.
 
     Returns:
-        (T, n, n) A, or with `opened` the tuple A, B (T, n, 2), C (T, 2, n).
+        (T, n, n) A, or with `opened` the tuple A, B (T, n, i), C (T, i, n).
     """
     check_runtime()
     if controller.adapts:
@@ -58,6 +59,8 @@ def linear_loop(
 @jax.jit
 def _linearised(benchmark, controller, system):
     """``linear_loop`` with the loop cut, for all plants of a discretised batch."""
+    layout = benchmark.layout
+    silence = jnp.zeros((layout.plant_outputs, 1))
     shared = getattr(controller, "coefficients", jnp.zeros(0)).ndim < 3
 
     def one(plant, coefficients):
@@ -71,13 +74,13 @@ def _linearised(benchmark, controller, system):
 
         def step(xi, v):
             after, signals, _ = sample_period(
-                benchmark, box, plant, at(unravel(xi), jnp.asarray(1)), 0.0, jnp.zeros((2, 1)), None
+                benchmark, box, plant, at(unravel(xi), jnp.asarray(1)), 0.0, silence, None
             )
             command = signals["u"]
             driven = after.plant + spread(plant.B, v[:, None] - command)
             return ravel_pytree(at(replace(after, plant=driven), None))[0], command[:, 0]
 
-        v = jnp.zeros(2)
+        v = jnp.zeros(len(layout.actuators))
         # No command acts on itself within a sample, so there is no direct term.
         (A, C), (B, _) = (jax.jacfwd(step, n)(rest, v) for n in (0, 1))
         return A, B, C
@@ -157,11 +160,11 @@ def _edge(A, B, C, omega, dt) -> float:
     z = np.exp(1j * omega * dt)
     L = (left / (z[:, None, None] - poles)) @ right
     loci = np.linalg.eigvals(L)
-    # Follow each branch: swap the pair wherever that makes the step between points smaller.
+    # Follow each branch: in the order that makes the step between points smallest.
+    orders = np.array(list(permutations(range(loci.shape[1]))))
     for i in range(1, len(loci)):
-        kept = np.abs(loci[i] - loci[i - 1]).sum()
-        if np.abs(loci[i, ::-1] - loci[i - 1]).sum() < kept:
-            loci[i] = loci[i, ::-1]
+        steps = np.abs(loci[i][orders] - loci[i - 1]).sum(axis=1)
+        loci[i] = loci[i][orders[np.argmin(steps)]]
     delays = []
     for branch in loci.T:
         above = np.abs(branch) - 1

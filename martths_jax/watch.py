@@ -12,13 +12,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from martths_jax.benchmark import VOLT_LIMIT, command_volts
 from martths_jax.indices import IndexSums, library, without_value
+from martths_jax.layout import Layout
 from martths_jax.observers import Observer
 
-#: A command or stroke beyond this is a loop that has run away: the largest stroke in the study is
-#: about a tenth of it, and the coupler has no position for strokes 254 mm apart.
-RUNAWAY_MM = 100.0
 NEVER = float(2**53)
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -49,11 +46,11 @@ class Watch:
     The trials are the last axis here, in the loop; in a ``Result`` they are the first.
 
     Attributes:
-        saturated: (2, T) each valve asks for more than its limit.
-        command: (2, T) a command left its range or is not a number.
-        stroke: (2, T) a measured stroke left its range or is not a number.
-        nonfinite: (2, T) a measured stroke is not finite.
-        volt_peak: (2, T) largest valve command while it was in range [V].
+        saturated: (n, T) each valve asks for more than its limit.
+        command: (n, T) a command left its range or is not a number.
+        stroke: (n, T) a measured stroke left its range or is not a number.
+        nonfinite: (n, T) a measured stroke is not finite.
+        volt_peak: (n, T) largest valve command while it was in range [V].
     """
 
     saturated: jax.Array
@@ -63,18 +60,27 @@ class Watch:
     volt_peak: jax.Array
 
 
+@dataclass(frozen=True)
 class Watcher(Observer):
-    """Keeps the ``Watch`` of a run; looks at ``u`` and ``x_m`` (2, T) [mm]."""
+    """Keeps the ``Watch`` of a run; looks at ``u`` and ``x_m`` (n, T) [mm].
+
+    Attributes:
+        layout: of the problem, whose limits it goes by.
+    """
+
+    layout: Layout
 
     def init(self, trials):
         """Nothing has happened yet."""
-        never = jnp.full((2, trials), NEVER)
-        return Watch(never, never, never, never, jnp.zeros((2, trials)))
+        shape = len(self.layout.actuators), trials
+        never = jnp.full(shape, NEVER)
+        return Watch(never, never, never, never, jnp.zeros(shape))
 
     def add(self, state, signals, reference, k, valid):
         watch = state
-        volts = jnp.abs(command_volts(signals["u"]))
-        in_range = jnp.abs(signals["u"]) <= RUNAWAY_MM
+        valves, most = self.layout.valves, self.layout.runaway_mm
+        volts = jnp.abs(valves.volts(signals["u"]))
+        in_range = jnp.abs(signals["u"]) <= most
         now = jnp.where(valid, k.astype(float), NEVER)
 
         def first(so_far, good):
@@ -82,10 +88,10 @@ class Watcher(Observer):
 
         peak = valid & in_range & (volts > watch.volt_peak)
         return Watch(
-            saturated=first(watch.saturated, ~(volts > VOLT_LIMIT)),
+            saturated=first(watch.saturated, ~(volts > valves.limit)),
             # NaN compares false, so it counts as out of range.
             command=first(watch.command, in_range),
-            stroke=first(watch.stroke, jnp.abs(signals["x_m"]) <= RUNAWAY_MM),
+            stroke=first(watch.stroke, jnp.abs(signals["x_m"]) <= most),
             nonfinite=first(watch.nonfinite, jnp.isfinite(signals["x_m"])),
             volt_peak=jnp.where(peak, volts, watch.volt_peak),
         )
@@ -113,7 +119,12 @@ def status_of(watch: Watch, sums: IndexSums | None = None) -> jax.Array:
 
 
 def describe(
-    watch: Watch, sums: IndexSums, trial: int, fs: float, counts: Mapping[str, Any] = NOTHING
+    watch: Watch,
+    sums: IndexSums,
+    trial: int,
+    fs: float,
+    layout: Layout,
+    counts: Mapping[str, Any] = NOTHING,
 ) -> str:
     """One line about a trial: its status, and what happened first, where and when.
 
@@ -121,40 +132,45 @@ def describe(
         watch, sums: of a finished run, trials on the last axis.
         trial: position in the batch.
         fs: sampling rate [Hz].
+        layout: of the problem.
         counts: (T,) what the controller counted, by what it counted.
     """
     status = Status(int(np.asarray(status_of(watch, sums))[trial]))
     column = lambda name: np.asarray(getattr(watch, name))[..., trial]  # noqa: E731
     parts = []
     if status >= Status.DIVERGED:
-        parts.append(_first_cause(column, status, fs))
+        parts.append(_first_cause(column, status, fs, layout))
     if status == Status.UNDEFINED:
         names = [n for n, missing in without_value(sums).items() if np.asarray(missing)[trial]]
         parts.append(f"{', '.join(names)} without a value, since the target does not move")
-    for i in range(2):
+    for i, name in enumerate(layout.actuators):
         first = column("saturated")[i]
         if first != NEVER:
             parts.append(
-                f"actuator {i + 1} beyond {VOLT_LIMIT:g} V from {_when(first, fs)}, "
+                f"actuator {name} beyond {layout.valves.limit:g} V from {_when(first, fs)}, "
                 f"peak {column('volt_peak')[i]:.3g} V"
             )
     parts += [f"{what}: {int(n[trial])}" for what, n in counts.items() if n[trial]]
     return f"{status.name.lower()}: {'; '.join(parts)}" if parts else status.name.lower()
 
 
-def _first_cause(column, status: Status, fs: float) -> str:
+def _first_cause(column, status: Status, fs: float, layout: Layout) -> str:
     """What took a trial away: the first event of its watch, whose arrays `column` picks."""
-    limit = f"left +-{RUNAWAY_MM:g} mm or became NaN"
+    limit = f"left +-{layout.runaway_mm:g} mm or became NaN"
     causes = [("command", limit), ("stroke", limit), ("nonfinite", "is not finite")]
     if status == Status.NONFINITE:
         causes.reverse()
     # `min` keeps the first of equals: the cause before its consequence.
     first, i, name, what = min(
-        ((column(name)[i], i, name, what) for name, what in causes for i in range(2)),
+        (
+            (column(name)[i], i, name, what)
+            for name, what in causes
+            for i in range(len(layout.actuators))
+        ),
         key=lambda event: event[0],
     )
     signal = "command u" if name == "command" else "measured stroke x_m"
-    return f"{signal} of actuator {i + 1} {what} at {_when(first, fs)}"
+    return f"{signal} of actuator {layout.actuators[i]} {what} at {_when(first, fs)}"
 
 
 def _when(sample: float, fs: float) -> str:

@@ -15,7 +15,7 @@ import jax
 import numpy as np
 
 from martths_jax import Benchmark, SensorNoise, build_benchmark
-from martths_jax.benchmark import command_volts
+from martths_jax.benchmark import LAYOUT
 from martths_jax.coupler import actuator_to_frame
 from martths_jax.indices import DELAYS, NAMES, PAIRS
 from martths_jax.simulation import reference_response
@@ -81,7 +81,7 @@ class LinearLoop:
         J = np.asarray(
             jax.jacobian(lambda x: actuator_to_frame(b.coupler, x[:, None])[:, 0])(np.zeros(2))
         )
-        taps = np.asarray(b.restoring)
+        taps = np.asarray(b.specimen.taps)
         F = taps[0] + taps[1] / z[:, None, None] + taps[2] / z[:, None, None] ** 2
         self.J, self.J_inverse = J, np.linalg.inv(J)
         self.ground_to_num, self.force_to_num = N[:, :, :1], -N[:, :, 1:] @ F @ J
@@ -157,7 +157,7 @@ class LinearLoop:
             row, delay = evaluate(self.J, x[:, :12], reference, self.benchmark.fs)
             rows.append(row)
             delays.append(delay)
-            volts.append(np.abs(np.asarray(command_volts(x[:, 12:].T))).max(axis=1))
+            volts.append(np.abs(np.asarray(LAYOUT.valves.volts(x[:, 12:].T))).max(axis=1))
         mean = dict(zip(NAMES, np.mean(rows, axis=0), strict=True))
         return mean, np.array(delays), np.array(volts)
 

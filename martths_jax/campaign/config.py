@@ -19,6 +19,7 @@ from martths_jax.control.base import Controller
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.indices import DEFAULT, Index, choose
 from martths_jax.motions import DEFAULT_SCALE, Motion
+from martths_jax.problem import find_problem
 from martths_jax.published import COMPARED
 from martths_jax.sensors import SensorNoise
 from martths_jax.text import shortened
@@ -40,6 +41,8 @@ class StudyConfig:
 
     trials: int = 1000
     seed: int = 1
+    problem: str = "marths"
+    case: int | None = None
     controllers: tuple = COMPARED
     indices: tuple = DEFAULT
     draws: str = "independent"
@@ -78,6 +81,10 @@ class StudyConfig:
         ]
         if found:
             return found
+        try:
+            problem = find_problem(self.problem, self.case)
+        except InputError as error:
+            return [str(error)]
         for what, kind in (("controllers", Controller), ("motions", Motion)):
             given = getattr(self, what) or ()
             odd = [g for g in given if not isinstance(g, (str, kind))]
@@ -89,9 +96,12 @@ class StudyConfig:
                 hint = f"; give one a name, as in {EXAMPLE}" if what == "controllers" else ""
                 found.append(f"Argument `{what}` names {name!r} twice{hint}.")
         try:
-            choose(self.indices)
+            choose(self.indices, problem.layout)
         except InputError as error:
             found.append(str(error))
+        if self.partition not in problem.partitions:
+            known = ", ".join(problem.partitions)
+            found.append(str(argument_error("partition", f"be one of {known}", self.partition)))
         if self.plants and self.draws != "independent":
             found.append("Arguments `plants` and `draws` exclude each other; give one of them.")
         return found
@@ -139,6 +149,7 @@ def _plain(value):
 def _from_mapping(settings: dict) -> StudyConfig:
     known = {f.name for f in fields(StudyConfig)}
     problems = unknown_names(sorted(set(settings) - known), known, "Setting")
+    settings = _usual(settings) | settings
     config = StudyConfig(**{k: _plain(v) for k, v in settings.items() if k in known})
     try:
         config = _expanded(config)
@@ -146,6 +157,15 @@ def _from_mapping(settings: dict) -> StudyConfig:
         problems.append(str(error))
     raise_all([*problems, *config.problems()])
     return config
+
+
+def _usual(settings: dict) -> dict:
+    """Settings of the problem that is meant, where they are other than a study's usual ones."""
+    try:
+        problem = find_problem(settings.get("problem", StudyConfig.problem), settings.get("case"))
+    except InputError:
+        return {}  # said by ``StudyConfig.problems``
+    return dict(problem.settings)
 
 
 def unknown_names(names, known, what: str) -> list[str]:

@@ -23,10 +23,8 @@ from martths_jax.campaign.files import writing
 from martths_jax.campaign.store import FORMAT, RunFolder
 from martths_jax.errors import InputError
 from martths_jax.files import forgiving
-from martths_jax.plant import PARAMETERS, Plants
 from martths_jax.watch import Status
 
-ACTUATORS = np.array([1, 2], dtype=np.int32)
 INDEX_UNITS = {"units": "see the variable `unit`; delays: positive = late"}
 #: Units as files spell them.
 SPELT = {"%": "percent", "mm²": "mm2"}
@@ -75,7 +73,7 @@ def outcome_variables(
     return variables
 
 
-def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
+def assemble(run: RunFolder, plants) -> xr.Dataset:
     """All results of a complete run.
 
     Args:
@@ -96,9 +94,8 @@ def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
     variables = outcome_variables(identity, cell, gather) | {
         "draw": (("trial", "parameter"), np.asarray(plants.draws), {
             "long_name": "standard normal draws of the plant", "units": "1"}),
-        "plant_hz": (("trial", "parameter"), np.asarray(plants.parameters_hz), {
-            "long_name": "zeros and poles of the plant; frame_pair is the factor on the pair",
-            "units": "Hz"}),
+        run.problem.stored[0]: (("trial", "parameter"), np.asarray(plants.values), dict(
+            zip(("long_name", "units"), run.problem.stored[1:], strict=True))),
     }  # fmt: skip
     variables |= _motion_variables(identity)
     coordinates = {
@@ -106,10 +103,16 @@ def assemble(run: RunFolder, plants: Plants) -> xr.Dataset:
         "motion": np.array(motions),
         "trial": np.arange(run.trials + 1, dtype=np.int32),
         "index": np.array(identity["indices"]),
-        "actuator": ACTUATORS,
-        "parameter": np.array(PARAMETERS),
+        "actuator": places(run.problem.layout.actuators),
+        "parameter": np.array(run.problem.parameters),
     }
     return xr.Dataset(variables, coordinates, attributes(run))
+
+
+def places(names: tuple[str, ...]) -> np.ndarray:
+    """Names of actuators or degrees of freedom as a coordinate: numbers where all are numbers."""
+    numbers = all(name.isdecimal() for name in names)
+    return np.array(names, dtype=np.int32) if numbers else np.array(names)
 
 
 def index_variables(identity: dict) -> dict:

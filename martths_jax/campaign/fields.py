@@ -10,13 +10,14 @@ from typing import Any
 from martths_jax.benchmark import FORCE_FROM, PARTITIONS
 from martths_jax.control.registry import names as known
 from martths_jax.indices import GROUPS
+from martths_jax.problem import PROBLEMS
 from martths_jax.structure.integrators import INTEGRATORS
 
 DRAWS = ("independent", "lhs", "sobol")
 #: Trials are numbered in 32 bits; the larger half of the numbers is for the noise of sensitivity
 #: analyses.
 MOST_TRIALS = 2**30 - 1
-CSV_KINDS = ("auto", "draws", "hz", "rad/s")
+CSV_KINDS = ("auto", "draws", "hz", "rad/s", "values")
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,10 @@ FIELDS = (
     Field("seed", "study", lambda v: is_whole(v, 0, 2**63 - 1),
           "be a whole number from 0 to 2^63 - 1",
           "Plant and sensor noise of trial i depend on (seed, i) alone."),
+    Field("problem", "study", _is_text, _choice(PROBLEMS),
+          f"What is tested: {', '.join(PROBLEMS)}."),
+    Field("case", "study", optional(lambda v: is_whole(v, 1)), "be the number of a case",
+          "Case of a problem that has several; left out: the first."),
     Field("controllers", "study", _is_list, "be a list of at least one controller",
           f"Controllers to compare: {', '.join(known())}, package.module:Class, file.py:Class, "
           "NAME=KIND{KEY=VALUE,...}, or names of [controller.NAME] tables."),

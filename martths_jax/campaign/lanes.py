@@ -47,7 +47,13 @@ class NoiseStore:
         self.trial = trial
 
     def block(self, trial: np.ndarray, deviation: np.ndarray, samples: int) -> np.ndarray:
-        """(samples, channels, lanes) noise [mm] of loaded trials with given deviations [mm]."""
+        """(samples, channels, lanes) noise of loaded trials.
+
+        Args:
+            trial: (lanes,) their numbers.
+            deviation: (lanes,) or (channels, lanes) standard deviations [mm, N].
+            samples: how many.
+        """
         position = np.searchsorted(self.trial, trial)
         noise = np.empty((samples, self.channels, trial.size))
         # Neighbours in the store are neighbours here most of the time: copy run by run.
@@ -80,13 +86,20 @@ class LaneEngine(Engine):
         """
         setup = replace(cells, controller=pick(cells, cell))
         lanes = fill(np.arange(cell.size), self.block)
-        deviation = np.sqrt(np.asarray(power) * setup.benchmark.fs)
-        noise = self.store.block(
-            np.asarray(noise_trial)[lanes], deviation[lanes], setup.ground.shape[0]
-        )
+        deviation = self._deviation(np.asarray(power)[lanes], setup.benchmark.fs)
+        noise = self.store.block(np.asarray(noise_trial)[lanes], deviation, setup.ground.shape[0])
         which = np.arange(cell.size)
         ran = run_block(setup, plants, noise, which, self.devices, keep=False, indices=self.indices)
         return self.outcome(ran, which.size)
+
+    def _deviation(self, power: np.ndarray, fs: float) -> np.ndarray:
+        """Standard deviations of the noise: (L,), or (channels, L) with load cells [mm, N]."""
+        noise = self.plan.noise
+        strokes = np.sqrt(power * fs)
+        if not noise.load_cells:
+            return strokes
+        forces = np.full((noise.load_cells, power.size), np.sqrt(noise.force_power * fs))
+        return np.vstack([*[strokes] * (noise.channels - noise.load_cells), *forces])
 
 
 class Worlds:
@@ -122,7 +135,7 @@ class Worlds:
         return self.known[key]
 
     def ground(self, benchmark: Benchmark, fs: float, scale: float | None, name: str):
-        """Ground acceleration (N,) of a motion, response (N, 6) of the reference structure."""
+        """Ground acceleration (N,) of a motion, response (N, o) of the reference structure."""
         key = id(benchmark), fs, scale, name
         if key not in self._grounds:
             motion = next(m for m in self.motions(fs, scale) if m.name == name)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from martths_jax.benchmark import Benchmark, build_benchmark
+from martths_jax.benchmark import Benchmark
 from martths_jax.campaign.config import StudyConfig, plain_value, unknown_names
 from martths_jax.campaign.draws import Draws, make_draws
 from martths_jax.campaign.given import named
@@ -23,6 +23,7 @@ from martths_jax.guests import Copy
 from martths_jax.indices import Index, choose, files_of
 from martths_jax.motions import BUILTIN_NAMES, Motion, load_motion
 from martths_jax.motions.catalogue import BENCHMARK_NAMES, record_files
+from martths_jax.problem import Problem, find_problem
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import prepare
 
@@ -38,6 +39,7 @@ class Plan:
         motions: in the order of the results.
         noise: sensor noise.
         draws: plants by trial number.
+        problem: what is tested.
     """
 
     config: StudyConfig
@@ -46,6 +48,7 @@ class Plan:
     motions: tuple[Motion, ...]
     noise: SensorNoise
     draws: Draws
+    problem: Problem
 
     @property
     def controllers(self) -> dict[str, Controller]:
@@ -85,7 +88,7 @@ class Plan:
     @property
     def indices(self) -> tuple[Index, ...]:
         """What is evaluated."""
-        return choose(self.config.indices)
+        return choose(self.config.indices, self.problem.layout)
 
     @property
     def counts(self) -> dict[str, str]:
@@ -131,6 +134,8 @@ def build_plan(config: StudyConfig) -> Plan:
         except InputError as error:
             problems.append(str(error))
 
+    problem = attempt(study_problem, config)
+    raise_all(problems, "The study cannot be run")
     benchmark = attempt(study_benchmark, config)
     motions = [attempt(study_motion, name, config) for name in motion_names(config, attempt)]
     chosen = {}
@@ -141,7 +146,7 @@ def build_plan(config: StudyConfig) -> Plan:
             if made is not None:
                 chosen[given_name(given)] = made
                 attempt(prepare, made.controller, benchmark, 1)
-    draws = attempt(make_draws, config)
+    draws = attempt(make_draws, config, problem)
     if draws is not None and any(trial > draws.trials for trial in config.keep):
         problems.append(
             f"Argument `keep` must name trials up to {draws.trials}, but got {max(config.keep)}."
@@ -151,8 +156,8 @@ def build_plan(config: StudyConfig) -> Plan:
         problems.append(f"Two motions are called {name!r}; rename one of the files.")
     problems += name_problems("motion", names) + name_problems("controller", list(chosen))
     raise_all(problems, "The study cannot be run")
-    noise = SensorNoise(config.noise_power, config.noise_shared, config.seed)
-    return Plan(config, benchmark, chosen, tuple(motions), noise, draws)
+    noise = problem.noise(config.noise_power, config.noise_shared, config.seed)
+    return Plan(config, benchmark, chosen, tuple(motions), noise, draws, problem)
 
 
 def given_name(given) -> str:
@@ -160,9 +165,18 @@ def given_name(given) -> str:
     return given.name if isinstance(given, Controller) else given
 
 
+def study_problem(config: StudyConfig) -> Problem:
+    """The problem of a configuration.
+
+    Raises:
+        InputError: for one, or a case, that does not exist.
+    """
+    return find_problem(config.problem, config.case)
+
+
 def study_benchmark(config: StudyConfig, coupler: Coupler | None = None) -> Benchmark:
-    """The benchmark of a configuration, with another coupler if one is given."""
-    return build_benchmark(
+    """The problem of a configuration as it runs, with another coupler if one is given."""
+    return study_problem(config).build(
         config.fs, config.integrator, partition=config.partition, force_from=config.force_from,
         coupler=coupler,
     )  # fmt: skip

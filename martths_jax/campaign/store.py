@@ -39,6 +39,7 @@ from martths_jax.campaign.parts import Damaged, read_part
 from martths_jax.campaign.stored import Stored
 from martths_jax.errors import InputError
 from martths_jax.guests import FILES, Copy
+from martths_jax.problem import Problem, find_problem
 from martths_jax.text import counted
 
 #: Version of the layout of the result files.
@@ -227,11 +228,12 @@ class RunFolder(Stored):
         if draws.table is None:
             return
         with contextlib.suppress(InputError):
-            if replace(draws, table=read_plants(file)).sha256 == draws.sha256:
+            table = read_plants(file, problem=draws.problem)
+            if replace(draws, table=table).sha256 == draws.sha256:
                 return
         if file.exists():
             set_aside(file)
-        write_plants(draws.plants(np.arange(1, draws.trials + 1)), file)
+        write_plants(draws.plants(np.arange(1, draws.trials + 1)), file, draws.problem)
 
     def keep_copies(self, copies: Iterable[Copy]) -> None:
         """Store the files that a user's code was loaded from, so that it can be loaded again."""
@@ -245,6 +247,12 @@ class RunFolder(Stored):
                     path.parent.mkdir(exist_ok=True)
                 write_bytes(path, content)
 
+    @property
+    def problem(self) -> Problem:
+        """What was tested."""
+        identity = self.header["identity"]
+        return find_problem(identity["problem"], identity["case"])
+
     def draws(self) -> Draws:
         """The plants by trial number.
 
@@ -253,8 +261,8 @@ class RunFolder(Stored):
         """
         identity, table = self.header["identity"], None
         if identity.get("plants_sha256"):
-            table = read_plants(self.path / PLANTS)
-        found = Draws(self.trials, identity["seed"], identity["spread"], table)
+            table = read_plants(self.path / PLANTS, problem=self.problem)
+        found = Draws(self.trials, identity["seed"], identity["spread"], table, self.problem)
         if found.sha256 != identity.get("plants_sha256"):
             raise InputError(
                 f"{self.path / PLANTS} is damaged: it does not hold the plants of this "

@@ -29,7 +29,7 @@ from martths_jax.errors import InputError, argument_error
 from martths_jax.indices import GROUPS
 
 #: Types of the settings that are no text.
-_TYPES = {"trials": int, "seed": int, "spread": float, "plants": Path, "records": Path,
+_TYPES = {"trials": int, "seed": int, "case": int, "spread": float, "plants": Path, "records": Path,
           "scale": float, "dt": float, "fs": float, "noise_power": float, "noise_shared": bool,
           "out": Path, "signals": bool, "devices": int, "memory_gb": float, "max_failed": int,
           "controllers": list[str], "motions": list[str], "indices": list[str],
@@ -40,7 +40,7 @@ _NAMES = {"controllers": ("--controller", "--controllers"), "motions": ("--motio
           "noise_shared": ("--noise-shared/--noise-apart",)}  # fmt: skip
 _METAVARS = {"controllers": "[NAME=]KIND[{KEY=VALUE,...}]", "motions": "NAME|FILE", "out": "PATH",
              "plants": "FILE", "records": "DIR", "dt": "S", "variable": "NAME|NUMBER",
-             "keep": "TRIAL", "indices": "NAME"}  # fmt: skip
+             "keep": "TRIAL", "indices": "NAME", "case": "N"}  # fmt: skip
 #: Texts with more to say than a line of a configuration file has room for.
 _HELP = {
     "motions": "Built-in motion (elcentro-like, kobe-like, morganhill-like), name under --records, "
@@ -56,7 +56,7 @@ _HELP = {
 }
 
 #: Settings of a study that say what is run and where; every campaign has them.
-STUDY = ("trials", "seed", "controllers", "indices", "motions", "records", "scale", "pga", "sa",
+STUDY = ("problem", "case", "trials", "seed", "controllers", "indices", "motions", "records", "scale", "pga", "sa",
          "units", "dt", "variable", "resample", "spread", "fs", "integrator", "partition",
          "force_from", "noise_power", "noise_shared", "out", "devices")  # fmt: skip
 #: Settings of how its plants are drawn.

@@ -10,7 +10,7 @@ import numpy as np
 from martths_jax.benchmark import VOLT_LIMIT
 from martths_jax.campaign.config import as_settings, make_config
 from martths_jax.campaign.draws import make_draws
-from martths_jax.campaign.plan import study_benchmark, study_motion
+from martths_jax.campaign.plan import study_benchmark, study_motion, study_problem
 from martths_jax.campaign.provenance import command_line
 from martths_jax.campaign.template import write_config
 from martths_jax.cli.console import console, error_console
@@ -102,7 +102,7 @@ def tune(
         for text in (text for motion in (*tuned_on, unseen) for text in motion.notices):
             _notice(text)
     benchmark = study_benchmark(study)
-    draws = make_draws(study)
+    draws = make_draws(study, study_problem(study))
     options = replace(options, trials=draws.trials)
     noise = SensorNoise(study.noise_power, study.noise_shared, study.seed)
     out = Path(study.out)

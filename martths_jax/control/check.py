@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +18,9 @@ import numpy as np
 from martths_jax.control.base import Controller, Decision, DelayLine, Observation
 from martths_jax.errors import InputError
 from martths_jax.signals import SIGNALS
+
+if TYPE_CHECKING:
+    from martths_jax.benchmark import Benchmark
 
 #: Number of trials to trace with: that of a block, so that JAX need not trace the stages of a
 #: sample again for it; or the next one that no array of the controller ends in.
@@ -33,12 +36,12 @@ _MOST_KEPT = 256
 Key = jax.tree_util.GetAttrKey
 
 
-def check_controller(controller: Controller, dt: float, trials: int) -> tuple[bool, ...]:
+def check_controller(controller: Controller, benchmark: Benchmark, trials: int) -> tuple[bool, ...]:
     """Check a prepared controller, and find which of its leaves hold one value a trial.
 
     Args:
         controller: as its ``prepare`` gave it.
-        dt: sample period [s].
+        benchmark: what it is prepared for.
         trials: how many are going to run.
 
     Returns:
@@ -48,31 +51,32 @@ def check_controller(controller: Controller, dt: float, trials: int) -> tuple[bo
         InputError: saying which part of the protocol is broken.
     """
     _check_pytree(controller)
-    key = _key(controller, dt, trials)
+    about = benchmark.dt, len(benchmark.layout.actuators)
+    key = _key(controller, about, trials)
     if key not in _GOOD:
         while len(_GOOD) >= _MOST_KEPT:
             del _GOOD[next(iter(_GOOD))]
-        _GOOD[key] = _check(controller, dt, trials)
+        _GOOD[key] = _check(controller, about, trials)
     return _GOOD[key]
 
 
-def _key(controller, dt, trials) -> tuple:
+def _key(controller, about, trials) -> tuple:
     leaves, tree = jax.tree.flatten(controller)
     shapes = tuple((np.shape(x), str(jnp.result_type(x))) for x in leaves)
     ending = tuple(bool(s) and s[-1] == trials for s, _ in shapes)
-    return tree, shapes, ending, dt, trials == 1
+    return tree, shapes, ending, about, trials == 1
 
 
-def _check(controller, dt, trials) -> tuple[bool, ...]:
+def _check(controller, about, trials) -> tuple[bool, ...]:
     marks, candidates = _declared(controller, trials)
     try:
-        _trace(controller, dt, marks)
+        _trace(controller, *about, marks)
     except InputError:
         # An array of a field that says nothing of its axes may hold one value a trial.
         if not any(candidates):
             raise
         marks = tuple(m or c for m, c in zip(marks, candidates, strict=True))
-        _trace(controller, dt, marks)
+        _trace(controller, *about, marks)
     return marks
 
 
@@ -157,7 +161,7 @@ def _name(path) -> str:
     return jax.tree_util.keystr(path).lstrip(".") or "itself"
 
 
-def _trace(controller, dt: float, marks: tuple[bool, ...]) -> None:
+def _trace(controller, dt: float, actuators: int, marks: tuple[bool, ...]) -> None:
     """Trace one sample with abstract arrays; every rule that is broken raises."""
     leaves, tree = jax.tree.flatten(controller)
     ends = {np.shape(x)[-1:] for x in leaves}
@@ -168,12 +172,12 @@ def _trace(controller, dt: float, marks: tuple[bool, ...]) -> None:
         )
         for x, own in zip(leaves, marks, strict=True)
     ]
-    pair = jax.ShapeDtypeStruct((2, trials), jnp.dtype(float))
+    strokes = jax.ShapeDtypeStruct((actuators, trials), jnp.dtype(float))
     number = jax.ShapeDtypeStruct((), jnp.dtype(int))
-    look = _Look(type(controller).__name__, trials, dt)
+    look = _Look(type(controller).__name__, trials, actuators, dt)
     jax.eval_shape(
         lambda leaves, *seen: look.sample(jax.tree.unflatten(tree, leaves), *seen),
-        abstract, number, pair, pair,
+        abstract, number, strokes, strokes,
     )  # fmt: skip
 
 
@@ -183,11 +187,12 @@ class _Look:
     Args:
         kind: class of the controller.
         trials: how many are traced.
+        actuators: number n of strokes.
         dt: sample period [s].
     """
 
-    def __init__(self, kind: str, trials: int, dt: float):
-        self.kind, self.trials, self.dt = kind, trials, dt
+    def __init__(self, kind: str, trials: int, actuators: int, dt: float):
+        self.kind, self.trials, self.actuators, self.dt = kind, trials, actuators, dt
 
     def sample(self, controller: Controller, k, target, measured) -> None:
         """Go through what the loop does in a sample and at a window's end."""
@@ -214,9 +219,7 @@ class _Look:
         if line and line.renew:
             renewed = self.call("renew of its delay line", line.renew, after)
             self.same(state, renewed, "state", "init", "renew of its delay line")
-        after = self.call(
-            "predict of its estimator", estimator.predict, corrected, decision.u
-        )
+        after = self.call("predict of its estimator", estimator.predict, corrected, decision.u)
         self.same(predicted, after, "estimator's state", "init", "predict")
 
     def refuse(self, wanted: str, got: str, remedy: str = "") -> None:
@@ -246,10 +249,10 @@ class _Look:
         return found
 
     def shaped(self, value, what: str) -> None:
-        """An array (2, T) of double precision."""
-        if jnp.shape(value) != (2, self.trials):
+        """An array (n, T) of double precision."""
+        if jnp.shape(value) != (self.actuators, self.trials):
             given = self.shape(value)
-            self.refuse(f"give a {what} of shape (2, trials)", given)
+            self.refuse(f"give a {what} of shape ({self.actuators}, trials)", given)
         if jnp.result_type(value) != jnp.dtype(float):
             self.refuse(f"give a {what} of type float64", str(jnp.result_type(value)))
 

@@ -155,6 +155,7 @@ class Entry:
             these, given what the controller has and what moves.
         clash: ``clash(settings)``: sentences about settings that exclude each other.
         look: position of its colour and dashes, where that shall be the same in all figures.
+        problem: what its default settings were chosen for.
     """
 
     name: str
@@ -170,6 +171,7 @@ class Entry:
     follow: Callable[[Mapping[str, Any], Mapping[str, Any]], dict[str, Any]] | None = None
     clash: Callable[[Mapping[str, Any]], list[str]] | None = None
     look: int | None = None
+    problem: str = "marths"
 
     def __post_init__(self):
         names = [p.name for p in self.parameters] + [d.name for d in self.derived]

@@ -31,7 +31,15 @@ from martths_jax.indices.sums import (
     observers_of,
     without_value,
 )
-from martths_jax.indices.table import DEFAULT, GROUPS, KNOWN, choose, files_of
+from martths_jax.indices.table import (
+    DEFAULT,
+    GROUPS,
+    KNOWN,
+    choose,
+    files_of,
+    groups_of,
+    known_of,
+)
 from martths_jax.indices.tracking import TrackingIndicator
 
 #: The benchmark's delays, and its pairs: name of the RMS index, name of the peak index.
@@ -66,9 +74,11 @@ __all__ = [
     "correlate",
     "files_of",
     "final_indices",
+    "groups_of",
     "indices",
     "indices_of",
     "join_sums",
+    "known_of",
     "library",
     "observers_of",
     "on_host",

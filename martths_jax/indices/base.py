@@ -208,6 +208,11 @@ class Index:
         return self.name.split("_")[0]
 
 
+def plain(place: str) -> str:
+    """A name of an actuator or degree of freedom as it stands in an index's: letters and digits."""
+    return re.sub(r"[^A-Za-z0-9]", "", place) or "0"
+
+
 def library(*arrays):
     """NumPy for arrays on the host, which then needs no compiling; ``jax.numpy`` for others."""
     return jnp if any(isinstance(x, jax.Array) for x in arrays) else np

@@ -7,16 +7,17 @@ the underscore name the actuator or the degree of freedom).
 
 from __future__ import annotations
 
-from martths_jax.indices.base import REFERENCE, Index, Pair
+from collections.abc import Sequence
+
+from martths_jax.indices.base import REFERENCE, Index, Pair, plain
 from martths_jax.indices.delay import Delay
 from martths_jax.indices.peak import Peak
 from martths_jax.indices.rms import Rms
 
 SOURCE = "Condori Uribe et al. 2023"
-#: Rows of ``num`` and of the reference's response by the degree of freedom.
-DOFS = {"4": 0, "28": 1, "2": 2, "26": 3, "3": 4, "27": 5}
-#: Rows of the strokes by the actuator.
-ACTUATORS = {"1": 0, "2": 1}
+#: Names of the actuators, the rows of the strokes; and of the degrees of freedom, the rows of
+#: ``num`` and of the reference's response: those of the interface and the others.
+ACTUATORS, INTERFACE, STOREYS = ("1", "2"), ("4", "28"), ("2", "26", "3", "27")
 
 _RMS, _PEAK = "rms error", "peak error"
 _COMPARED = {
@@ -31,18 +32,34 @@ _COMPARED = {
     "J9": ("%", Peak(), "est", REFERENCE, f"{_PEAK} against the reference, interface DOF {{}}"),
     "J10": ("%", Peak(), "num", REFERENCE, f"{_PEAK} against the reference, storey DOF {{}}"),
 }
-NAMES = (
-    "J1_1", "J1_2", "J2_1", "J2_2", "J3_1", "J3_2", "J4_1", "J4_2", "J5_4", "J5_28", "J6_4",
-    "J6_28", "J7_4", "J7_28", "J8_2", "J8_26", "J8_3", "J8_27", "J9_4", "J9_28", "J10_2",
-    "J10_26", "J10_3", "J10_27",
-)  # fmt: skip
 
 
-def _index(name: str) -> Index:
-    group, place = name.split("_")
-    unit, kind, value, target, label = _COMPARED[group]
-    row = DOFS[place] if "stroke" not in label else ACTUATORS[place]
-    return Index(name, unit, kind, Pair.of(value, target, row), label.format(place), SOURCE)
+def indices_for(
+    actuators: Sequence[str], interface: Sequence[str], storeys: Sequence[str], source: str = ""
+) -> tuple[Index, ...]:
+    """J1 to J10 of any structure whose actuators and degrees of freedom have these names.
+
+    Args:
+        actuators: rows of the strokes.
+        interface: degrees of freedom that they move, the first rows of ``num``.
+        storeys: the rows after them.
+        source: where the indices are defined.
+    """
+    places = {
+        "stroke": {name: row for row, name in enumerate(actuators)},
+        "interface": {name: row for row, name in enumerate(interface)},
+        "storey": {name: row for row, name in enumerate(storeys, len(interface))},
+    }
+    found = []
+    for group, (unit, kind, value, target, label) in _COMPARED.items():
+        where = next(place for place in places if place in label)
+        for name, row in places[where].items():
+            pair = Pair.of(value, target, row)
+            found.append(
+                Index(f"{group}_{plain(name)}", unit, kind, pair, label.format(name), source)
+            )
+    return tuple(found)
 
 
-INDICES = tuple(map(_index, NAMES))
+INDICES = indices_for(ACTUATORS, INTERFACE, STOREYS, SOURCE)
+NAMES = tuple(index.name for index in INDICES)

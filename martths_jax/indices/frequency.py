@@ -19,13 +19,14 @@ of the benchmark have less than 0.1 % of their energy.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from martths_jax.indices.base import TINY, Index, Kind, Pair, Row, library
+from martths_jax.indices.base import TINY, Index, Kind, Pair, Row, library, plain
 from martths_jax.indices.benchmark import ACTUATORS
 
 #: Frequencies [Hz]: from and to, and about how far apart.
@@ -112,12 +113,17 @@ class FrequencyEvaluation(Kind):
         return {"amplitude": (100 * (xp.abs(index) - 1), missing), "delay": (delay, missing)}
 
 
-INDICES = tuple(
-    Index(
-        f"FEI{name}_{place}", unit, FrequencyEvaluation(), Pair.of("x_m", "x_a", row),
-        f"{of} error of actuator {place} by the frequency evaluation index",
-        "Guo et al. 2014, Smart Materials and Structures 23(4)", of,
-    )
-    for name, of, unit in (("amp", "amplitude", "%"), ("delay", "delay", "ms"))
-    for place, row in ACTUATORS.items()
-)  # fmt: skip
+def indices_for(actuators: Sequence[str]) -> tuple[Index, ...]:
+    """Those of actuators with these names."""
+    return tuple(
+        Index(
+            f"FEI{name}_{plain(place)}", unit, FrequencyEvaluation(), Pair.of("x_m", "x_a", row),
+            f"{of} error of actuator {place} by the frequency evaluation index",
+            "Guo et al. 2014, Smart Materials and Structures 23(4)", of,
+        )
+        for name, of, unit in (("amp", "amplitude", "%"), ("delay", "delay", "ms"))
+        for row, place in enumerate(actuators)
+    )  # fmt: skip
+
+
+INDICES = indices_for(ACTUATORS)

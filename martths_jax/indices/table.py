@@ -13,12 +13,14 @@ From Python an ``Index`` may stand there itself.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 
 from martths_jax.errors import InputError
 from martths_jax.guests import Place, absent, is_place, load
-from martths_jax.indices import benchmark, frequency, tracking, true_stroke
+from martths_jax.indices import benchmark, frequency, tracking, true_stroke, uniaxial
 from martths_jax.indices.base import Index
+from martths_jax.layout import Layout
 
 #: What can be named beside the indices: the group of each file.
 GROUPS = {
@@ -28,17 +30,43 @@ GROUPS = {
     "frequency": frequency.INDICES,
 }
 KNOWN = {index.name: index for group in GROUPS.values() for index in group}
+#: Tables that a problem names (``Layout.table``): what stands in place of the benchmark's indices,
+#: or beside them.
+TABLES = {"": {}, "uniaxial": uniaxial.GROUPS}
+_BY_ACTUATOR = {"true": true_stroke, "tracking": tracking, "frequency": frequency}
 #: What of one's own can be named, to complete "Give ...".
 WAYS = "package.module:NAME or path/file.py:NAME"
 #: What runs if nothing is said.
 DEFAULT = ("benchmark",)
 
 
-def choose(given: Iterable[str | Index] | str | Index = DEFAULT) -> tuple[Index, ...]:
+@lru_cache
+def groups_of(layout: Layout | None = None) -> Mapping[str, tuple[Index, ...]]:
+    """Groups of a problem's indices by name; without one, of the maRTHS benchmark."""
+    if layout is None:
+        return GROUPS
+    n = len(layout.interface)
+    own = benchmark.indices_for(
+        layout.actuators, layout.interface, layout.outputs[n:], layout.paper
+    )
+    of = {name: file.indices_for(layout.actuators) for name, file in _BY_ACTUATOR.items()}
+    return {"benchmark": own} | of | TABLES[layout.table]
+
+
+@lru_cache
+def known_of(layout: Layout | None = None) -> Mapping[str, Index]:
+    """A problem's indices by name."""
+    return {i.name: i for group in groups_of(layout).values() for i in group}
+
+
+def choose(
+    given: Iterable[str | Index] | str | Index = DEFAULT, layout: Layout | None = None
+) -> tuple[Index, ...]:
     """The indices that are meant, each once, in the order in which they were named.
 
     Args:
         given: names, groups and ``Index`` objects; or a single one; or names between commas.
+        layout: of the problem; by default the maRTHS benchmark's.
 
     Raises:
         InputError: listing every name that is unknown or taken twice.
@@ -48,11 +76,11 @@ def choose(given: Iterable[str | Index] | str | Index = DEFAULT) -> tuple[Index,
     elif isinstance(given, Index):
         given = [given]
     found: dict[str, Index] = {}
-    problems = []
+    known, problems = known_of(layout), []
     for one in given:
         try:
-            for index in _meant(one):
-                same = found.get(index.name, KNOWN.get(index.name, index))
+            for index in _meant(one, layout):
+                same = found.get(index.name, known.get(index.name, index))
                 if same != index:
                     raise InputError(
                         f"Two indices are called {index.name!r}; give your own another name."
@@ -98,7 +126,8 @@ def shown_of(asked: Iterable[str], usual: tuple[str, ...], names: Sequence[str])
     return tuple(n for n in usual if n in names) or tuple(names[: len(usual)])
 
 
-def _meant(one) -> Iterator[Index]:
+def _meant(one, layout: Layout | None) -> Iterator[Index]:
+    groups, known = groups_of(layout), known_of(layout).values()
     if isinstance(one, Index):
         return iter((one,))
     if not isinstance(one, str):
@@ -106,16 +135,16 @@ def _meant(one) -> Iterator[Index]:
             f"Argument `indices` must hold names and Index objects, but got {type(one).__name__}."
         )
     word = one.casefold()
-    if word in GROUPS:
-        return iter(GROUPS[word])
-    named = [i for i in KNOWN.values() if word in (i.name.casefold(), i.group.casefold())]
+    if word in groups:
+        return iter(groups[word])
+    named = [i for i in known if word in (i.name.casefold(), i.group.casefold())]
     if named:
         return iter(named)
     if is_place(one):
         return _loaded(one)
-    names = list(dict.fromkeys([*GROUPS, *(i.group for i in KNOWN.values()), *KNOWN]))
+    names = list(dict.fromkeys([*groups, *(i.group for i in known), *(i.name for i in known)]))
     near = difflib.get_close_matches(one, names, n=3, cutoff=0.5)
-    hint = f"the nearest are {', '.join(near)}" if near else f"groups are {', '.join(GROUPS)}"
+    hint = f"the nearest are {', '.join(near)}" if near else f"groups are {', '.join(groups)}"
     raise InputError(
         f"Index {one!r} is unknown; {hint}.  One of your own is {WAYS}, or an Index object in "
         "Python."

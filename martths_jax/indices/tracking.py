@@ -16,11 +16,12 @@ wanders would grow with the noise.  Lag and lead cancel in it; the rms over time
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import jax.numpy as jnp
 
-from martths_jax.indices.base import Index, Kind, Pair, joined, library
+from martths_jax.indices.base import Index, Kind, Pair, joined, library, plain
 from martths_jax.indices.benchmark import ACTUATORS
 
 NAMES = ("last", "square", "value", "target", "samples")
@@ -57,12 +58,17 @@ class TrackingIndicator(Kind):
         return {"last": (state["last"], missing), "rms": (rms, missing)}
 
 
-INDICES = tuple(
-    Index(
-        f"{name}_{place}", "mm²", TrackingIndicator(), Pair.of("x_m", "x_a", row),
-        f"tracking indicator of actuator {place}, {words}",
-        "Mercan and Ricles 2007, Earthquake Engineering & Structural Dynamics 36(11)", of,
-    )
-    for name, of, words in (("TI", "last", "at the end"), ("TIrms", "rms", "rms over time"))
-    for place, row in ACTUATORS.items()
-)  # fmt: skip
+def indices_for(actuators: Sequence[str]) -> tuple[Index, ...]:
+    """Those of actuators with these names."""
+    return tuple(
+        Index(
+            f"{name}_{plain(place)}", "mm²", TrackingIndicator(), Pair.of("x_m", "x_a", row),
+            f"tracking indicator of actuator {place}, {words}",
+            "Mercan and Ricles 2007, Earthquake Engineering & Structural Dynamics 36(11)", of,
+        )
+        for name, of, words in (("TI", "last", "at the end"), ("TIrms", "rms", "rms over time"))
+        for row, place in enumerate(actuators)
+    )  # fmt: skip
+
+
+INDICES = indices_for(ACTUATORS)

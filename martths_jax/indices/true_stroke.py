@@ -9,17 +9,25 @@ common.
 
 from __future__ import annotations
 
-from martths_jax.indices.base import Index, Pair
+from collections.abc import Sequence
+
+from martths_jax.indices.base import Index, Pair, plain
 from martths_jax.indices.benchmark import ACTUATORS
 from martths_jax.indices.peak import Peak
 from martths_jax.indices.rms import Rms
 
-INDICES = tuple(
-    Index(
-        f"{group}true_{place}", "%", kind, Pair.of("x", "x_a", row),
-        f"{words} of the true stroke {place}, without sensor noise",
-        "J2, J3 of Condori Uribe et al. 2023 on the plant's output",
-    )
-    for group, kind, words in (("J2", Rms(), "rms error"), ("J3", Peak(), "peak error"))
-    for place, row in ACTUATORS.items()
-)  # fmt: skip
+
+def indices_for(actuators: Sequence[str]) -> tuple[Index, ...]:
+    """Those of actuators with these names."""
+    return tuple(
+        Index(
+            f"{group}true_{plain(place)}", "%", kind, Pair.of("x", "x_a", row),
+            f"{words} of the true stroke {place}, without sensor noise",
+            "J2, J3 of Condori Uribe et al. 2023 on the plant's output",
+        )
+        for group, kind, words in (("J2", Rms(), "rms error"), ("J3", Peak(), "peak error"))
+        for row, place in enumerate(actuators)
+    )  # fmt: skip
+
+
+INDICES = indices_for(ACTUATORS)

@@ -1,1 +1,1 @@
-"""The rig of any problem: actuators, their uncertain plants, and what couples them to a frame."""
+"""What the laboratory has: actuators with their uncertain plants, coupler, specimens."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from martths_jax.campaign.draws import standard_normal
 from martths_jax.campaign.memory import RESULT_BYTES
-from martths_jax.plant import PARAMETERS, Plants
+from martths_jax.problem import Problem, find_problem
 from martths_jax.resources import available_memory
 
 #: The factor that picks the noise realisation, and the one that picks the motion.
@@ -34,10 +34,12 @@ class Design:
         factors: d names: the nine plant parameters, ``noise`` and, if there are several motions,
             ``motion``.
         unit: (N, d + 2, d) points in the unit cube.
+        problem: whose plants are varied.
     """
 
     factors: tuple[str, ...]
     unit: np.ndarray
+    problem: Problem
 
     @property
     def samples(self) -> int:
@@ -54,8 +56,8 @@ class Design:
         return self.unit.reshape(self.rows, -1)[:, self.factors.index(factor)]
 
     def draws(self) -> np.ndarray:
-        """(rows, 9) standard normal draws of the plants, by the inverse distribution function."""
-        unit = self.unit.reshape(self.rows, -1)[:, : len(PARAMETERS)]
+        """(rows, p) standard normal draws of the plants, by the inverse distribution function."""
+        unit = self.unit.reshape(self.rows, -1)[:, : len(self.problem.parameters)]
         return standard_normal(unit)
 
     def streams(self) -> np.ndarray:
@@ -68,9 +70,9 @@ class Design:
             return np.zeros(self.rows, dtype=np.int64)
         return np.minimum(np.floor(self.column(MOTION) * count), count - 1).astype(np.int64)
 
-    def plants(self, which: np.ndarray, spread: float) -> Plants:
+    def plants(self, which: np.ndarray, spread: float):
         """Plants of some rows, numbered by row."""
-        return Plants(self.draws()[which], np.asarray(which), float(spread))
+        return self.problem.plants(self.draws()[which], np.asarray(which), float(spread))
 
 
 def saltelli(samples: int, dimensions: int, seed: int) -> np.ndarray:
@@ -94,15 +96,16 @@ def saltelli(samples: int, dimensions: int, seed: int) -> np.ndarray:
     return unit
 
 
-def make_design(samples: int, motions: int, seed: int) -> Design:
-    """Design over the plant's nine parameters, the noise and, if there are several, the motion."""
-    factors = (*PARAMETERS, NOISE, *([MOTION] if motions > 1 else []))
-    return Design(factors, saltelli(samples, len(factors), seed))
+def make_design(samples: int, motions: int, seed: int, problem: Problem | None = None) -> Design:
+    """Design over the plant's parameters, the noise and, if there are several, the motion."""
+    problem = problem or find_problem()
+    factors = (*problem.parameters, NOISE, *([MOTION] if motions > 1 else []))
+    return Design(factors, saltelli(samples, len(factors), seed), problem)
 
 
-def most_samples() -> int:
-    """Largest N for which a design fits into the memory that is free."""
-    d = len(PARAMETERS) + 2
+def most_samples(problem: Problem | None = None) -> int:
+    """Largest N for which a problem's design fits into the memory that is free."""
+    d = len((problem or find_problem()).parameters) + 2
     room = available_memory() / (8 * d * (d + 2) * COPIES + RESULT_BYTES * (d + 2))
     return 2 ** int(min(30, math.log2(max(room, 2))))
 

@@ -10,10 +10,10 @@ import xarray as xr
 from martths_jax.campaign.assembly import Results
 from martths_jax.campaign.assembly import write_results as write_files
 from martths_jax.campaign.dataset import (
-    ACTUATORS,
     attributes,
     index_names,
     outcome_variables,
+    places,
     read_results,
 )
 from martths_jax.campaign.plan import Plan
@@ -149,7 +149,7 @@ def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
         "factor": np.array(design.factors),
         "row": np.array(["A", "B", *(f"AB {f}" for f in design.factors)]),
         "sample": np.arange(design.samples, dtype=np.int32),
-        "actuator": ACTUATORS,
+        "actuator": places(run.problem.layout.actuators),
     }
     about = attributes(run) | {
         "title": "Virtual multi-axial real-time hybrid simulation: global sensitivity",

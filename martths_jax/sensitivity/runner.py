@@ -11,13 +11,12 @@ import numpy as np
 from martths_jax.campaign.cells import Batch, Block, Campaign
 from martths_jax.campaign.config import StudyConfig, make_config, read_toml, unknown_names
 from martths_jax.campaign.lanes import LaneEngine
-from martths_jax.campaign.plan import Plan, build_plan
+from martths_jax.campaign.plan import Plan, build_plan, study_problem
 from martths_jax.campaign.progress import Reporter, Tally
 from martths_jax.campaign.run import run_campaign
 from martths_jax.errors import argument_error, raise_all
 from martths_jax.indices import choose
 from martths_jax.indices.table import shown_of
-from martths_jax.plant import check_plants
 from martths_jax.published import PROPOSED
 from martths_jax.runtime import check_runtime
 from martths_jax.sensitivity.design import Design, is_power_of_two, make_design, most_samples
@@ -172,7 +171,7 @@ def build(config, shown: Iterable[str], changes: dict) -> tuple[Plan, Design, tu
     if not isinstance(config, StudyConfig):
         config = DEFAULTS | dict(config or {})
     study = make_config(config, **changes)
-    names = [index.name for index in choose(study.indices)]
+    names = [index.name for index in choose(study.indices, study_problem(study).layout)]
     shown = shown_of(shown, SHOWN, names)
     problems = unknown_names([n for n in shown if n not in names], names, "Index")
     if not is_power_of_two(study.trials):
@@ -181,7 +180,7 @@ def build(config, shown: Iterable[str], changes: dict) -> tuple[Plan, Design, tu
             f"Argument `trials` must be a power of two, which Sobol' points are balanced at, but "
             f"got {study.trials}; {near} is the nearest."
         )
-    elif study.trials > (most := most_samples()):
+    elif study.trials > (most := most_samples(study_problem(study))):
         problems.append(str(argument_error(
             "trials", f"be at most {most}, whose design fits into memory", study.trials
         )))  # fmt: skip
@@ -195,6 +194,6 @@ def build(config, shown: Iterable[str], changes: dict) -> tuple[Plan, Design, tu
         problems.append("Argument `noise_power` must be above zero: the noise would not vary.")
     raise_all(problems, "The analysis cannot be run")
     plan = build_plan(study)
-    design = make_design(study.trials, len(plan.motions), study.seed)
-    check_plants(design.plants(np.arange(design.rows), study.spread))
+    design = make_design(study.trials, len(plan.motions), study.seed, plan.problem)
+    plan.problem.check(design.plants(np.arange(design.rows), study.spread))
     return plan, design, shown

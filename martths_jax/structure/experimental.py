@@ -18,6 +18,7 @@ from martths_jax.structure.damping import modal_damping, rayleigh_coefficients
 from martths_jax.structure.frame import FORCE_DOFS, Structure, independent_coordinate
 from martths_jax.structure.modes import condense
 from martths_jax.structure.sections import INCH, check_positive
+from martths_jax.structure.taps import backward_taps
 
 E_STEEL = 200e9  # Pa
 RHO_STEEL = 7850.0  # kg/m^3
@@ -135,8 +136,7 @@ def restoring_maps(frame: ExperimentalFrame, dt: float) -> np.ndarray:
     """
     P = condensation(frame)
     K, C, M = (matrix @ P for matrix in (frame.K, frame.C, frame.M))
-    taps = [K + C / dt + M / dt**2, -C / dt - 2 * M / dt**2, M / dt**2]
-    return np.stack([tap[:3] for tap in taps])
+    return backward_taps(M, C, K, dt)[:, :3]
 
 
 def benchmark_partition(reference: Structure, removed: ExperimentalFrame) -> Structure:

@@ -31,11 +31,11 @@ FORCE_DOFS = (4, 28, 31)
 
 @dataclass(frozen=True)
 class Structure:
-    """Second-order model M a + C v + K d = -mass_ground l a_g + f of a frame with diaphragms.
+    """Second-order model M a + C v + K d = -M l a_g + f in independent coordinates.
 
     Attributes:
-        M, C, K: (29, 29) mass [kg], damping and stiffness in the independent coordinates.
-        influence: (29,) ones on the storey translations.
+        M, C, K: (n, n) mass [kg], damping and stiffness; n = 29 for the benchmark's frame.
+        influence: (n,) l, the motion of the coordinates when the ground moves by one.
     """
 
     M: np.ndarray

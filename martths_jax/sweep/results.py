@@ -12,10 +12,10 @@ import xarray as xr
 from martths_jax.campaign.assembly import Results
 from martths_jax.campaign.assembly import write_results as write_files
 from martths_jax.campaign.dataset import (
-    ACTUATORS,
     attributes,
     index_names,
     outcome_variables,
+    places,
     read_results,
 )
 from martths_jax.campaign.statistics import percentile
@@ -23,7 +23,6 @@ from martths_jax.campaign.store import RunFolder
 from martths_jax.campaign.tables import Summary, Table, extent, number
 from martths_jax.campaign.tidy import write_runs
 from martths_jax.indices.table import shown_of
-from martths_jax.plant import PARAMETERS
 from martths_jax.sweep.axes import Axis, Scalar
 from martths_jax.sweep.config import SHOWN, SweepConfig
 from martths_jax.sweep.grid import cell_numbers
@@ -154,8 +153,8 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         "motion": np.array(motions),
         "trial": np.arange(run.trials + 1, dtype=np.int32),
         "index": np.array(identity["indices"]),
-        "actuator": ACTUATORS,
-        "parameter": np.array(PARAMETERS),
+        "actuator": places(run.problem.layout.actuators),
+        "parameter": np.array(run.problem.parameters),
     }  # fmt: skip
     about = attributes(run) | {
         "title": "Virtual multi-axial real-time hybrid simulation: sweep",

@@ -17,7 +17,6 @@ from martths_jax.campaign.plan import Plan, build_controller, build_plan, motion
 from martths_jax.campaign.progress import Reporter
 from martths_jax.campaign.run import run_campaign
 from martths_jax.errors import InputError, raise_all
-from martths_jax.plant import check_plants
 from martths_jax.runtime import check_runtime
 from martths_jax.simulation import Setup, prepare
 from martths_jax.sweep.config import SHOWN, SweepConfig, make_sweep
@@ -201,7 +200,7 @@ def build(sweep: SweepConfig) -> tuple[Plan, Worlds, dict[Job, object]]:
     for spread in sweep.axis("spread") or ():
         try:
             draws = _draws(base.draws, spread)
-            check_plants(draws.plants(np.arange(draws.trials + 1)))
+            draws.problem.check(draws.plants(np.arange(draws.trials + 1)))
         except InputError as error:
             problems.append(f"Axis `spread` at {spread:g}: {error}")
     raise_all(dict.fromkeys(problems), "The sweep cannot be run")

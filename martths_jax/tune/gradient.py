@@ -80,7 +80,7 @@ class Gradient:
         fs = benchmark.fs
         trials = len(plants)
         devices = jax.local_devices()[: math.gcd(trials, jax.local_device_count())]
-        observers = objective.observers(fs)
+        observers = objective.observers(fs, benchmark.layout)
 
         forward = self.mode == "forward"
 
@@ -93,7 +93,7 @@ class Gradient:
                 ground,
                 reference,
                 noise,
-                trials=plants.draws.shape[0],
+                trials=plants.trial.shape[0],
                 observers=observers,
                 segment=0 if forward else segment_length(ground.shape[0], loop.window_of(ready)),
             )

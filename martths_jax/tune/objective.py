@@ -19,9 +19,10 @@ from functools import cached_property
 import jax
 import jax.numpy as jnp
 
-from martths_jax.benchmark import VOLT_LIMIT
+from martths_jax.benchmark import LAYOUT, VOLT_LIMIT
 from martths_jax.errors import argument_error
 from martths_jax.indices import KNOWN, Index, IndexSums, indices_of, observers_of
+from martths_jax.layout import Layout
 from martths_jax.observers import Observer
 from martths_jax.watch import Watcher
 
@@ -93,9 +94,9 @@ class Objective:
         """The indices that count, of kinds that have a useful gradient."""
         return tuple(replace(KNOWN[name], kind=KNOWN[name].kind.smooth()) for name in self.names)
 
-    def observers(self, fs: float) -> tuple[Observer, ...]:
-        """What has to look at a run at a sampling rate [Hz]."""
-        return (*observers_of(self.smooth, fs), Watcher())
+    def observers(self, fs: float, layout: Layout = LAYOUT) -> tuple[Observer, ...]:
+        """What has to look at a run at a sampling rate [Hz] of a problem."""
+        return (*observers_of(self.smooth, fs), Watcher(layout))
 
     def evaluate(
         self, observers: tuple[Observer, ...], states, weights: jax.Array | None = None

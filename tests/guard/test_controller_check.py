@@ -26,8 +26,6 @@ from martths_jax.control.check import PROBE, RESERVED, check_controller
 from martths_jax.control.estimators import DirectMeasurement
 from tests.engine.motions import burst
 
-DT = 1 / 1024
-
 
 def own(fields=(), registered=True, estimator=DirectMeasurement(), **methods):
     """An instance of a good controller with some of its methods and fields replaced."""
@@ -162,10 +160,10 @@ def test_good_controllers_pass_once_for_all(benchmark, monkeypatch):
 
     monkeypatch.setattr(check, "_GOOD", {})
     ready = ADFC(nb=64, no=63).prepare(benchmark)
-    assert not any(check_controller(ready, DT, 3))
+    assert not any(check_controller(ready, benchmark, 3))
     monkeypatch.setattr(check, "_trace", lambda *given: pytest.fail("was traced again"))
-    assert not any(check_controller(ready, DT, 500))
-    assert not any(check_controller(replace(ready, pull=jnp.asarray(1e-3)), DT, 3))
+    assert not any(check_controller(ready, benchmark, 500))
+    assert not any(check_controller(replace(ready, pull=jnp.asarray(1e-3)), benchmark, 3))
 
 
 def test_reserved_names_are_the_loops_own(benchmark):
@@ -189,8 +187,8 @@ class Gain(Controller):
         return state, Decision(self.taps.sum() * self.gain * seen.x_a)
 
 
-def marked(controller, trials) -> list[bool]:
-    return list(check_controller(controller, DT, trials))
+def marked(benchmark, controller, trials) -> list[bool]:
+    return list(check_controller(controller, benchmark, trials))
 
 
 @pytest.fixture
@@ -203,15 +201,15 @@ def as_users_write_it():
 @pytest.mark.usefixtures("as_users_write_it")
 def test_which_arrays_hold_one_value_a_trial(benchmark):
     scalar, taps = np.asarray(2.0), np.ones(5)
-    assert marked(Gain(scalar, taps), 5) == [False, False]
-    assert marked(Gain(np.ones(4), taps), 4) == [True, False]
-    assert marked(Gain(np.ones(PROBE), taps), PROBE) == [True, False]
+    assert marked(benchmark, Gain(scalar, taps), 5) == [False, False]
+    assert marked(benchmark, Gain(np.ones(4), taps), 4) == [True, False]
+    assert marked(benchmark, Gain(np.ones(PROBE), taps), PROBE) == [True, False]
     with pytest.raises(InputError, match="step ends in ValueError"):
-        marked(Gain(np.ones(4), taps), 3)
+        marked(benchmark, Gain(np.ones(4), taps), 3)
     # What a class says of its fields is taken as it stands: two trials, and (8, 2) is shared.
     ready = ADFC(nb=64, no=63, pull=np.ones(2)).prepare(benchmark)
     names = [jax.tree_util.keystr(p) for p, _ in jax.tree_util.tree_leaves_with_path(ready)]
-    found = dict(zip(names, marked(ready, 2), strict=True))
+    found = dict(zip(names, marked(benchmark, ready, 2), strict=True))
     assert [name for name, own in found.items() if own] == [".pull"]
 
 
@@ -231,7 +229,7 @@ def test_a_number_of_values_that_is_not_that_of_the_trials(benchmark):
 
 
 @pytest.mark.usefixtures("as_users_write_it")
-def test_a_controller_may_say_what_its_axes_are():
+def test_a_controller_may_say_what_its_axes_are(benchmark):
     said = type("Said", (Gain,), {"shared_axes": MappingProxyType({"gain": 0, "taps": 1})})
     said = jax.tree_util.register_dataclass(dataclass(frozen=True)(said))
-    assert marked(said(np.ones(5), np.ones(5)), 5) == [True, False]
+    assert marked(benchmark, said(np.ones(5), np.ones(5)), 5) == [True, False]

@@ -164,7 +164,7 @@ def test_a_stroke_that_is_not_finite_at_once(benchmark):
     """A broken sensor: no range was left before, so the status says what it is."""
     from martths_jax import watch
 
-    watcher = watch.Watcher()
+    watcher = watch.Watcher(benchmark.layout)
     seen = watcher.init(1)
     good = {"u": jnp.ones((2, 1)), "x_m": jnp.ones((2, 1))}
     broken = good | {"x_m": jnp.array([[1.0], [jnp.inf]])}
@@ -173,6 +173,6 @@ def test_a_stroke_that_is_not_finite_at_once(benchmark):
     sums = simulate(benchmark, Passthrough(), nominal_plant(), burst(0.3)).sums
     sums = trials_last(sums)
     assert watch.status_of(seen, sums).tolist() == [Status.NONFINITE]
-    assert watch.describe(seen, sums, 0, 1024.0) == (
+    assert watch.describe(seen, sums, 0, 1024.0, benchmark.layout) == (
         "nonfinite: measured stroke x_m of actuator 2 is not finite at sample 1 (0.001 s)"
     )

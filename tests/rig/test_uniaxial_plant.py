@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from martths_jax.problem.uniaxial.plant import UNCERTAINTY, Loop, plant_model
+from martths_jax.problem.uniaxial.plant import PUBLISHED, Loop, plant_model, uncertainty
 from martths_jax.rig.plants import draw, nominal
 from martths_jax.structure.modal import to_dense
 
@@ -85,7 +85,7 @@ def test_discrete_plant_is_the_zero_order_hold_of_the_printed_coefficients(trial
 def test_uncertain_are_four_by_the_benchmarks_standard_deviations():
     values = np.asarray(draw(plant_model(), 3000, 1).values)
     np.testing.assert_allclose(np.std(values, axis=0), [1.3, 3.3, 3.31e3, 5e4], rtol=0.05)
-    assert UNCERTAINTY.names == ("a3", "b1", "b2", "k_e")
+    assert uncertainty(PUBLISHED).names == ("a3", "b1", "b2", "k_e")
 
 
 def test_a_loop_of_ones_own():

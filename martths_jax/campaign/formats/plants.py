@@ -11,18 +11,17 @@ from martths_jax.campaign.assembly import Results
 from martths_jax.campaign.draws import write_plants
 from martths_jax.campaign.formats.base import Format
 from martths_jax.errors import InputError
-from martths_jax.plant import Plants
+from martths_jax.problem import find_problem
 
 
 def export_plants(dataset: xr.Dataset, path: Path) -> None:
     """The uncertain plants, trials 1 ... N, as CSV, for ``--plants`` to read back exactly."""
-    write_plants(
-        Plants(dataset.draw.values[1:], dataset.trial.values[1:], _spread(dataset)), Path(path)
+    about = json.loads(dataset.attrs["identity"])
+    problem = find_problem(about["problem"], about["case"])
+    plants = problem.plants(
+        dataset.draw.values[1:], dataset.trial.values[1:], float(about["spread"])
     )
-
-
-def _spread(dataset: xr.Dataset) -> float:
-    return float(json.loads(dataset.attrs["identity"])["spread"])
+    write_plants(plants, Path(path), problem)
 
 
 def _write(done: Results, path: Path, signals: bool) -> None:
@@ -34,4 +33,4 @@ def _write(done: Results, path: Path, signals: bool) -> None:
     export_plants(done.dataset, path)
 
 
-PLANTS = Format("plants", "CSV file of the nine parameters of each plant", _write)
+PLANTS = Format("plants", "CSV file of the uncertain parameters of each plant", _write)

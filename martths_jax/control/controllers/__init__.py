@@ -17,6 +17,7 @@ from martths_jax.control.controllers import (
     mff_lqg,
     passthrough,
     phase_lead,
+    pi_lead,
     polynomial,
     polynomial_darby,
     polynomial_wallace,
@@ -39,6 +40,7 @@ from martths_jax.control.controllers.mff import MFF
 from martths_jax.control.controllers.mff_lqg import MFFLQG
 from martths_jax.control.controllers.passthrough import Passthrough
 from martths_jax.control.controllers.phase_lead import PhaseLead
+from martths_jax.control.controllers.pi_lead import LeadAndPI
 from martths_jax.control.controllers.polynomial import Polynomial
 from martths_jax.control.controllers.polynomial_darby import PolynomialDarby
 from martths_jax.control.controllers.polynomial_wallace import PolynomialWallace
@@ -65,6 +67,7 @@ ENTRIES = (
     error_model.ENTRY,
     adfc_rls.ENTRY,
     adfc_weighted.ENTRY,
+    pi_lead.ENTRY,
 )
 
 __all__ = [
@@ -83,6 +86,7 @@ __all__ = [
     "ErrorModel",
     "FrozenFeedforward",
     "Inverse",
+    "LeadAndPI",
     "Observation",
     "Passthrough",
     "PhaseLead",

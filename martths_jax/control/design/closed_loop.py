@@ -57,7 +57,7 @@ class _Structure:
     def __init__(self, benchmark):
         A, B, C, D = to_dense(benchmark.numerical)
         self.A, self.B, self.C, self.D = A, B[:, 1:], C, D[:, 1:]
-        self.taps = np.asarray(benchmark.restoring)
+        self.taps = np.asarray(benchmark.specimen.taps)
         lever = float(benchmark.coupler.arm) * np.sin(float(benchmark.coupler.alpha))
         self.interface = np.linalg.inv(MM * np.array([[1.0, lever], [1.0, -lever]]))
 
