@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy import linalg, special
 
 from martths_jax.errors import argument_error, as_numbers
 
@@ -107,6 +108,40 @@ class Uncertainty:
         ]
         return jnp.stack(columns, axis=1)
 
+    def draws(self, values, spread: float = 1.0) -> np.ndarray:
+        """Standard normal draws that give parameters (T, p), the inverse of ``values`` (host).
+
+        Raises:
+            InputError: for a spread of zero, or a value that no draw gives.
+        """
+        values = as_numbers(values)
+        if values.ndim != 2 or values.shape[1] != len(self):
+            raise argument_error(
+                "values", f"have shape (trials, {len(self)})", f"shape {values.shape}"
+            )
+        if not self.names:
+            return values
+        columns = []
+        for i, name in enumerate(self.names):
+            sigma = self.sigmas[i] * spread
+            if not sigma > 0:
+                raise argument_error("spread", f"leave {name} a deviation", f"{sigma:g} for it")
+            one = (self.distributions[i], self.kinds[i], self.nominal[i], sigma)
+            with np.errstate(all="ignore"):
+                z = _draw(*one, values[:, i])
+            if not np.all(np.isfinite(z)):
+                row = int(np.argmin(np.isfinite(z)))
+                raise argument_error(
+                    "values", f"be within the {self.distributions[i]} distribution of {name}",
+                    f"{values[row, i]:g} in row {row}",
+                )  # fmt: skip
+            columns.append(z)
+        z = np.stack(columns, axis=1)
+        if self.correlation is None:
+            return z
+        L = np.linalg.cholesky(np.array(self.correlation))
+        return linalg.solve_triangular(L, z.T, lower=True).T
+
     def column(self, values: jax.Array, name: str) -> jax.Array:
         """(T,) values of one parameter out of (T, p).
 
@@ -126,6 +161,15 @@ def _parameter(distribution: str, kind: str, m, sigma, z):
     if distribution == "uniform":
         z = np.sqrt(3) * jax.scipy.special.erf(z * np.sqrt(0.5))
     return m * (1 + sigma * z) if kind == "relative" else m + sigma * z
+
+
+def _draw(distribution: str, kind: str, m: float, sigma: float, x: np.ndarray) -> np.ndarray:
+    """(T,) draws of one parameter, the inverse of ``_parameter``; not finite where none fits."""
+    if distribution == "lognormal":
+        share = sigma if kind == "relative" else sigma / abs(m)
+        return np.log(x / m) / float(_log_sigma(share))
+    z = (x / m - 1) / sigma if kind == "relative" else (x - m) / sigma
+    return np.sqrt(2) * special.erfinv(z / np.sqrt(3)) if distribution == "uniform" else z
 
 
 def _log_sigma(share):

@@ -243,6 +243,16 @@ def test_trials_depend_on_seed_and_number_alone_and_keep_their_numbers():
     np.testing.assert_array_equal(draw(MIXED, 3, 7, spread=0.0).values, [[-5.0, 3e4, 40.0]] * 3)
 
 
+def test_draws_scatter_about_another_plant():
+    other = table(MIXED, [-6.0, 1e4, 50.0])
+    about, usual = draw(MIXED, 4, 7, around=other), draw(MIXED, 4, 7)
+    factor = np.array([[6 / 5, 1 / 3, 5 / 4]])
+    np.testing.assert_allclose(about.values, usual.values * factor, rtol=1e-14)
+    np.testing.assert_array_equal(about.continuous()[0], other.continuous()[0])
+    with pytest.raises(InputError, match="`around` must be one plant of the same model"):
+        draw(MIXED, 4, around=about)
+
+
 def test_no_parameter_is_uncertain():
     model = PlantModel(StateSpace(*frame_rig()))
     plants = draw(model, 3)
