@@ -105,6 +105,17 @@ def test_derivative_by_the_geometry_is_that_of_differences():
         np.testing.assert_allclose(np.sum(found * step), (there[0] - back[0]) / 2, rtol=1e-6)
 
 
+def test_second_derivative_is_that_of_the_closed_form():
+    """x alone: stroke = sqrt((w + x)^2 + v^2) - rest, so x'' = -stroke'' / stroke'^3."""
+    coupler, x = build(("x",)), 0.07
+    w, v = 1.3 + x, -0.06
+    length = np.hypot(w, v)
+    found = jax.grad(jax.grad(lambda s: coupler.to_frame(s[None])[0]))
+    strokes = 1e3 * (length - np.hypot(1.3, v))
+    expected = -(v**2 / length**3) / (w / length) ** 3 / 1e6
+    np.testing.assert_allclose(found(jnp.asarray(strokes)), expected, rtol=1e-9)
+
+
 def _with(coupler, attachment):
     """The coupler with other hinges, the bases where they are."""
     base = coupler.attachment - coupler.along
@@ -147,6 +158,10 @@ def test_the_benchmarks_coupler_is_right_to_the_first_order_of_one_over_the_leng
 
 def test_strokes_that_fit_no_position():
     assert np.all(np.isnan(two().to_frame(jnp.array([200.0, -200.0]))))
+    # A crank of one metre gives no stroke of more.
+    crank = build_planar_coupler([Actuator("a", (0.0, 1.0), direction=(1.0, 0.0))], "r")
+    np.testing.assert_allclose(crank.to_frame(jnp.array([[-500.0]])), np.pi / 6, rtol=1e-14)
+    assert np.all(np.isnan(crank.to_frame(jnp.array([[-1050.0, 1050.0, 1300.0]]))))
 
 
 def test_each_actuator_moves_its_own_degree_of_freedom():
