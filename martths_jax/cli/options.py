@@ -56,9 +56,9 @@ _HELP = {
 }
 
 #: Settings of a study that say what is run and where; every campaign has them.
-STUDY = ("problem", "case", "trials", "seed", "controllers", "indices", "motions", "records", "scale", "pga", "sa",
-         "units", "dt", "variable", "resample", "spread", "fs", "integrator", "partition",
-         "force_from", "noise_power", "noise_shared", "out", "devices")  # fmt: skip
+STUDY = ("problem", "case", "trials", "seed", "controllers", "indices", "motions", "records",
+         "scale", "pga", "sa", "units", "dt", "variable", "resample", "spread", "fs", "integrator",
+         "partition", "force_from", "noise_power", "noise_shared", "out", "devices")  # fmt: skip
 #: Settings of how its plants are drawn.
 DRAWN = ("draws", "plants", "plants_as")
 

@@ -109,12 +109,19 @@ class Uncertainty:
         return jnp.stack(columns, axis=1)
 
     def draws(self, values, spread: float = 1.0) -> np.ndarray:
-        """Standard normal draws that give parameters (T, p), the inverse of ``values`` (host).
+        """Standard normal draws that give parameters, the inverse of ``values`` (host).
+
+        Args:
+            values: (T, p) or (p,) parameters.
+            spread: factor on all standard deviations [-].
+
+        Returns:
+            (T, p) draws, zero where nothing varies.
 
         Raises:
-            InputError: for a spread of zero, or a value that no draw gives.
+            InputError: for a wrong shape, or a value that no draw gives.
         """
-        values = as_numbers(values)
+        values = np.atleast_2d(as_numbers(values))
         if values.ndim != 2 or values.shape[1] != len(self):
             raise argument_error(
                 "values", f"have shape (trials, {len(self)})", f"shape {values.shape}"
@@ -123,10 +130,7 @@ class Uncertainty:
             return values
         columns = []
         for i, name in enumerate(self.names):
-            sigma = self.sigmas[i] * spread
-            if not sigma > 0:
-                raise argument_error("spread", f"leave {name} a deviation", f"{sigma:g} for it")
-            one = (self.distributions[i], self.kinds[i], self.nominal[i], sigma)
+            one = (self.distributions[i], self.kinds[i], self.nominal[i], self.sigmas[i] * spread)
             with np.errstate(all="ignore"):
                 z = _draw(*one, values[:, i])
             if not np.all(np.isfinite(z)):
@@ -165,6 +169,8 @@ def _parameter(distribution: str, kind: str, m, sigma, z):
 
 def _draw(distribution: str, kind: str, m: float, sigma: float, x: np.ndarray) -> np.ndarray:
     """(T,) draws of one parameter, the inverse of ``_parameter``; not finite where none fits."""
+    if sigma == 0:
+        return np.where(np.isclose(x, m, rtol=1e-12, atol=0), 0.0, np.inf)
     if distribution == "lognormal":
         share = sigma if kind == "relative" else sigma / abs(m)
         return np.log(x / m) / float(_log_sigma(share))

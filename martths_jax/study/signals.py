@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from martths_jax.campaign.dataset import index_names, read_dataset, write_dataset
+from martths_jax.campaign.dataset import index_names, places, read_dataset, write_dataset
 from martths_jax.campaign.engine import Engine
 from martths_jax.campaign.files import writing
 from martths_jax.campaign.store import FORMAT
@@ -129,7 +129,7 @@ def _shared(engine: Engine, motion: str) -> xr.Dataset:
         },
         {
             "time": ("time", np.arange(ground.size) / engine.plan.benchmark.fs, {"units": "s"}),
-            "dof": np.array([4, 28, 2, 26, 3, 27], dtype=np.int32),
+            "dof": places(engine.plan.problem.layout.outputs),
         },
     )  # fmt: skip
 

@@ -82,6 +82,7 @@ def test_zero_draws_are_nominal_and_others_scatter_about_a_given_plant():
 def test_draws_are_found_from_the_values(correlation):
     both, z = three(correlation=correlation), draws(30, 4)
     np.testing.assert_allclose(both.draws(both.values(z, 0.3), 0.3), z, rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(both.draws(both.nominal, 0.0), np.zeros((1, 3)))
     assert Uncertainty().draws(np.zeros((4, 0))).shape == (4, 0)
 
 
@@ -90,8 +91,8 @@ def test_draws_are_found_from_the_values(correlation):
     [
         ([[2.0, -40.0, 36.1]], 1.0, "be within the uniform distribution of mass, but got 36.1 in"),
         ([[2.0, -4.0, 30.0], [-2.0, -4.0, 30.0]], 1.0, "lognormal distribution of gain, .* row 1"),
-        ([[2.0, -40.0, 30.0]], 0.0, "`spread` must leave gain a deviation, but got 0 for it"),
-        ([2.0, -40.0, 30.0], 1.0, r"have shape \(trials, 3\), but got shape \(3,\)"),
+        ([[2.0, -40.0, 30.0]], 0.0, "be within the uniform distribution of mass, but got 30 in"),
+        ([2.0, -40.0], 1.0, r"have shape \(trials, 3\), but got shape \(1, 2\)"),
     ],
 )
 def test_values_that_no_draw_gives(values, spread, message):
