@@ -293,6 +293,18 @@ def test_a_rule_of_damping_gives_its_ratios(rule):
         np.testing.assert_allclose(ratio[[0, second]], pair, rtol=1e-9)
 
 
+def test_a_caughey_series_leaves_what_has_no_mass_undamped():
+    """With a rotation kept for an actuator, the modes have the ratios that they have without."""
+    free = read(toml_of(two_storeys(), damping=RULES["caughey"])).reference
+    found = with_part("a column", RULES["caughey"]).reference
+    heavy = [i for i, name in enumerate(found.dofs) if not name.endswith(".rotation")]
+    assert len(heavy) == len(found.dofs) - 1
+    np.testing.assert_allclose(
+        found.C[np.ix_(heavy, heavy)], free.C, rtol=1e-8, atol=1e-8 * free.C.max()
+    )
+    assert not np.any(np.delete(found.C, heavy, axis=0))
+
+
 #: Laboratory parts of the two-storey frame: members and masses, interface, what is held there.
 PARTS = {
     "a column": ('["ac"]', '["c.x", "c.r"]', "[]"),
