@@ -341,6 +341,10 @@ def test_matrices_in_other_units(tmp_path):
     text = text.replace('interface = ["c.x", "c.r"]\n', "condense = false\n") + RAYLEIGH
     text += "[matrices]\n" + write_npz(tmp_path, "all", NAMES, K=K, M=M)
     found = read(text, tmp_path).reference
+    r = np.linspace(0.1, 1.2, len(NAMES))
+    more = "influence = [" + ", ".join(map(repr, map(float, r / arm))) + "]\n"
+    led = read(text.replace('ground = "x"\n', "") + more, tmp_path).reference
+    np.testing.assert_allclose(led.influence, r, rtol=1e-14)
     np.testing.assert_allclose(found.K, WHOLE.K, rtol=1e-12, atol=1e-12 * WHOLE.K.max())
     np.testing.assert_allclose(found.M, WHOLE.M, rtol=1e-12, atol=1e-9)
 

@@ -404,6 +404,14 @@ def test_nodes_inside_the_specimen_are_condensed():
     wanted[0, 0] += m / 2
     np.testing.assert_allclose(heavy.laboratory.M, wanted, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(heavy.numerical.M[0, 0], 2000 + 1.5 * m, rtol=1e-9)
+    load = heavy.reference.M @ heavy.reference.influence
+    np.testing.assert_allclose(
+        load[heavy.at], [2000 + 2 * m + m * shape[0].sum(), m * shape[1].sum()], rtol=1e-9
+    )
+    text = column_in_pieces(3, 7850.0)
+    whole = text[: text.index("laboratory")] + text[text.index("[damping]") :]
+    change = 100 * (heavy.reference.frequency[0] / read(whole).reference.frequency[0] - 1)
+    assert any(f"change by {change:+.2g} %" in note for note in heavy.notes) and change != 0
 
 
 def test_a_floors_degree_of_freedom_goes_by_the_name_of_the_interface():
