@@ -264,6 +264,8 @@ def test_a_specimen_that_is_more_than_the_reference(tmp_path):
     assert data.notes[-1].startswith(
         "The laboratory part is stiffer than the reference in the motion"
     )
+    np.savez(tmp_path / "part.npz", M=np.array([[1 + 1e-15]]), **part)
+    assert read(text, tmp_path).numerical.M[0, 0] == 0.0, "round-off is no mass"
     np.savez(tmp_path / "part.npz", M=np.array([[1.5]]), **part)
     wanted = "line 8: The laboratory part has more mass than the reference in the motion of a.x: "
     assert wanted in sentence_of(text, tmp_path)

@@ -293,6 +293,18 @@ def test_a_rule_of_damping_gives_its_ratios(rule):
         np.testing.assert_allclose(ratio[[0, second]], pair, rtol=1e-9)
 
 
+def test_a_caughey_series_leaves_what_has_no_mass_undamped():
+    """With a rotation kept for an actuator, the modes have the ratios that they have without."""
+    free = read(toml_of(two_storeys(), damping=RULES["caughey"])).reference
+    found = with_part("a column", RULES["caughey"]).reference
+    heavy = [i for i, name in enumerate(found.dofs) if not name.endswith(".rotation")]
+    assert len(heavy) == len(found.dofs) - 1
+    np.testing.assert_allclose(
+        found.C[np.ix_(heavy, heavy)], free.C, rtol=1e-8, atol=1e-8 * free.C.max()
+    )
+    assert not np.any(np.delete(found.C, heavy, axis=0))
+
+
 #: Laboratory parts of the two-storey frame: members and masses, interface, what is held there.
 PARTS = {
     "a column": ('["ac"]', '["c.x", "c.r"]', "[]"),
@@ -392,6 +404,14 @@ def test_nodes_inside_the_specimen_are_condensed():
     wanted[0, 0] += m / 2
     np.testing.assert_allclose(heavy.laboratory.M, wanted, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(heavy.numerical.M[0, 0], 2000 + 1.5 * m, rtol=1e-9)
+    load = heavy.reference.M @ heavy.reference.influence
+    np.testing.assert_allclose(
+        load[heavy.at], [2000 + 2 * m + m * shape[0].sum(), m * shape[1].sum()], rtol=1e-9
+    )
+    text = column_in_pieces(3, 7850.0)
+    whole = text[: text.index("laboratory")] + text[text.index("[damping]") :]
+    change = 100 * (heavy.reference.frequency[0] / read(whole).reference.frequency[0] - 1)
+    assert any(f"change by {change:+.2g} %" in note for note in heavy.notes) and change != 0
 
 
 def test_a_floors_degree_of_freedom_goes_by_the_name_of_the_interface():
