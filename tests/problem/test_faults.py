@@ -271,6 +271,19 @@ def test_a_specimen_that_is_more_than_the_reference(tmp_path):
     assert wanted in sentence_of(text, tmp_path)
 
 
+def test_sizes_beyond_all_bounds():
+    text = GOOD.replace("A = 4e-3\nI", "A = 1e300\nI")
+    assert "line 25: Member b-d has a stiffness or a mass beyond all bounds" in sentence_of(text)
+    text = GOOD.replace("b = {x = 0, y = 3}", "b = {x = 0, y = 1e200}")
+    assert "Member ab has a stiffness or a mass beyond" in sentence_of(text)
+    text = GOOD.replace("m = 100.0", "m = 1e25")
+    assert "line 28: The natural frequencies cannot be found: stiff" in sentence_of(text)
+    text = GOOD.replace("m = 100.0", "m = 1e-300")
+    assert "line 28: Equations of the structure are singular here: some" in sentence_of(text)
+    text = GOOD.replace("column = {E = 210e9", "column = {E = 1e-20")
+    assert "line 28: The frame is a mechanism" in sentence_of(text)
+
+
 def test_damping_given_twice(tmp_path):
     matrices(tmp_path, np.eye(2), np.eye(2))
     with np.load(tmp_path / "a.npz") as file:

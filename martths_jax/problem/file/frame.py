@@ -182,16 +182,29 @@ def _read_members(root: Table, tables: FrameTables) -> None:
             continue
         member = Member(*ends, section, section, **settings)
         try:
-            _matrices(tables, member)
+            _check_member(tables, member)
         except InputError as error:
             table.fault(None, f"Member {name} {error}")
             continue
         tables.members[name] = member
 
 
-def _matrices(tables: FrameTables, m: Member):
+def _check_member(tables: FrameTables, m: Member) -> None:
+    """Refuse a member without length or with numbers beyond all bounds.
+
+    Raises:
+        InputError: to follow the member's name.
+    """
     section, material = tables.sections[m.section], tables.materials[m.material]
-    return member_matrices(m, section, material, tables.nodes[m.start], tables.nodes[m.end])
+    ends = tables.nodes[m.start], tables.nodes[m.end]
+    try:
+        with np.errstate(all="ignore"):
+            found = member_matrices(m, section, material, *ends)
+        good = np.all(np.isfinite(found))
+    except ArithmeticError:
+        good = False
+    if not good:
+        raise InputError("has a stiffness or a mass beyond all bounds: check its units.")
 
 
 def _read_supports(root: Table, tables: FrameTables) -> None:

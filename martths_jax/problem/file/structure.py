@@ -13,7 +13,7 @@ from martths_jax.problem.file.data import StructureData
 from martths_jax.problem.file.document import Document, read_document
 from martths_jax.problem.file.sources import Whole, read_frame_form, read_matrices_form
 from martths_jax.structure.assembly import check_definite
-from martths_jax.structure.modes import massive
+from martths_jax.structure.modes import massive, natural_modes
 from martths_jax.structure.partition import negative_directions, separate
 
 
@@ -71,3 +71,10 @@ def _check_mass(whole: Whole) -> None:
         raise InputError(f"The mass is negative in the motion of {', '.join(negative)}.")
     if not massive(whole.M).size:
         raise InputError("Nothing has mass: M is zero.")
+    with np.errstate(invalid="ignore"):
+        omega = natural_modes(whole.M, whole.K)[0]
+    if not np.all(omega > 0):
+        raise InputError(
+            "The natural frequencies cannot be found: stiffnesses or masses are too far apart; "
+            "check their units."
+        )
