@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from martths_jax.layout import Layout
+from martths_jax.published import NOTHING, Published
 from martths_jax.sensors import SensorNoise
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ class Problem:
         stored: name, words and unit of the variable that holds the parameters' values.
         noise: noise(power [mm^2 s], shared, seed) -> ``SensorNoise``.
         settings: of a study, where its usual ones are other than the maRTHS benchmark's.
+        published: what is printed of its nominal plant, for comparison only.
         partitions: ways to part the structure that it offers.
         identity: what decides its numbers beside this package's code, as JSON can hold it.
     """
@@ -63,5 +65,6 @@ class Problem:
     stored: tuple[str, str, str]
     noise: Callable[[float, bool, int], SensorNoise] = SensorNoise
     settings: Mapping[str, Any] = field(default_factory=dict)
+    published: Published = NOTHING
     partitions: tuple[str, ...] = ("benchmark",)
     identity: Mapping[str, Any] = field(default_factory=dict)

@@ -15,6 +15,7 @@ from martths_jax.campaign.dataset import (
     outcome_variables,
     places,
     read_results,
+    title_of,
 )
 from martths_jax.campaign.plan import Plan
 from martths_jax.campaign.store import RunFolder
@@ -152,7 +153,7 @@ def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
         "actuator": places(run.problem.layout.actuators),
     }
     about = attributes(run) | {
-        "title": "Virtual multi-axial real-time hybrid simulation: global sensitivity",
+        "title": f"{title_of(run.problem)}: global sensitivity",
         "confidence": f"{LEVEL:g}, percentile bootstrap, {RESAMPLES} resamples of base samples",
         "base_samples": design.samples,
     }

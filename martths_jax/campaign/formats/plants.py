@@ -8,16 +8,16 @@ from pathlib import Path
 import xarray as xr
 
 from martths_jax.campaign.assembly import Results
+from martths_jax.campaign.dataset import problem_of
 from martths_jax.campaign.draws import write_plants
 from martths_jax.campaign.formats.base import Format
 from martths_jax.errors import InputError
-from martths_jax.problem import find_problem
 
 
 def export_plants(dataset: xr.Dataset, path: Path) -> None:
     """The uncertain plants, trials 1 ... N, as CSV, for ``--plants`` to read back exactly."""
     about = json.loads(dataset.attrs["identity"])
-    problem = find_problem(about["problem"], about["case"])
+    problem = problem_of(dataset)
     plants = problem.plants(
         dataset.draw.values[1:], dataset.trial.values[1:], float(about["spread"])
     )

@@ -76,11 +76,11 @@ ENTRY = Entry(
     paper="Silva et al. 2020, sample controller of the uniaxial benchmark",
     problem="uniaxial",
     parameters=(
-        Parameter("proportional", "P", "proportional gain", 2.0, "1", 0.0, kind="lane"),
-        Parameter("integral", "I", "integral gain", 95.0, "1/s", 0.0, kind="lane"),
-        Parameter("lead_gain", "g", "gain of the lead", 50.8, "1", 0.0, kind="lane"),
-        Parameter("lead_zero", "z", "zero of the lead", 168.6, "1/s", 0.0, kind="lane"),
+        Parameter("proportional", "P", "proportional gain", 2.0, "1", 0.0, kind="tunable"),
+        Parameter("integral", "I", "integral gain", 95.0, "1/s", 0.0, kind="tunable"),
+        Parameter("lead_gain", "g", "gain of the lead", 50.8, "1", 0.0, kind="tunable"),
+        Parameter("lead_zero", "z", "zero of the lead", 168.6, "1/s", 0.0, kind="tunable"),
         Parameter("lead_pole", "p", "pole of the lead", 8570.0, "1/s", 0.0, above=True,
-                  kind="lane"),
+                  kind="tunable"),
     ),
 )  # fmt: skip
