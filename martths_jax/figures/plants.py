@@ -100,10 +100,15 @@ def _only(values: np.ndarray) -> np.ndarray:
 def _magnitude_and_phase(plants, strokes: int, reduce: Callable) -> list[np.ndarray]:
     """Magnitude [dB] and phase [degree] of the channels, (..., F, n, n), plants reduced."""
     blocks = [
-        (reduce(20 * np.log10(np.abs(response))), reduce(np.rad2deg(phase)))
+        (reduce(20 * np.log10(_above_zero(np.abs(response)))), reduce(np.rad2deg(phase)))
         for _, response, phase in _responses(plants, strokes)
     ]
     return [np.concatenate(parts, axis=-3) for parts in zip(*blocks, strict=True)]
+
+
+def _above_zero(size: np.ndarray) -> np.ndarray:
+    """Magnitudes, NaN where no command reaches a stroke."""
+    return np.where(size > 0, size, np.nan)
 
 
 def _bands(axis, percentiles: np.ndarray, data: dict, name: str) -> None:

@@ -220,4 +220,8 @@ def leading(found: Sensitivity, controller: str, most: int = 3) -> Table:
 
 
 def _cell(value: float, low: float, high: float) -> str:
-    return "–" if np.isnan(value) else f"{value:.2f} [{low:.2f}, {high:.2f}]"
+    if np.isnan(value):
+        return "–"
+    # Few samples of an index that hardly varies make the ends of an interval as large as can be.
+    value, low, high = (f"{x:.2f}" if abs(x) < 1000 else f"{x:.0e}" for x in (value, low, high))
+    return f"{value} [{low}, {high}]"
