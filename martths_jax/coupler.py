@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from martths_jax.algebra import angles
 from martths_jax.errors import argument_error, as_numbers
 from martths_jax.once import once
 from martths_jax.runtime import check_precision
@@ -84,7 +85,7 @@ def frame_to_actuator(coupler: Coupler, interface: jax.Array) -> jax.Array:
     """
     x, theta = interface
     # cos(alpha_i + theta) - cos(alpha_i) = -2 sin^2(theta/2) cos(alpha) -+ sin(theta) sin(alpha)
-    half = _sine(theta / 2)
+    half = angles.sine(theta / 2)
     common = x - 2 * coupler.arm * jnp.cos(coupler.alpha) * half**2
     sine = 2 * half * jnp.sqrt(1 - half**2)
     skew = coupler.arm * jnp.sin(coupler.alpha) * sine
@@ -109,28 +110,4 @@ def actuator_to_frame(coupler: Coupler, strokes_mm: jax.Array) -> jax.Array:
     half = sine / (1 + jnp.sqrt(1 - sine * sine))  # tan(theta / 2)
     # The mean stroke is x_4 + p cos(alpha) (cos(theta) - 1), with 1 - cos = sin tan(theta / 2).
     drop = coupler.arm * jnp.cos(coupler.alpha) * sine * half
-    return jnp.stack([(x_1 + x_2) * 0.5 + drop, _angle(half)])
-
-
-def _sine(x: jax.Array) -> jax.Array:
-    """sin(x), to the last digit for |x| <= 1/2 (a rotation of one radian).
-
-    The library function is a scalar call per element on CPUs and took a third of the whole loop.
-    """
-    square, series = x * x, 1.0
-    for n in range(8, 0, -1):
-        series = 1.0 - square * (1 / (2 * n * (2 * n + 1))) * series
-    return x * series
-
-
-def _angle(half: jax.Array) -> jax.Array:
-    """Angle in [-1, 1] rad with the given tangent of its half, to the last digit.
-
-    A second half-angle step tan(a/2) = tan(a) / (1 + sqrt(1 + tan(a)^2)) brings the argument under
-    0.26, where the series of the arc tangent is short.
-    """
-    quarter = half / (1 + jnp.sqrt(1 + half * half))
-    square, series = quarter * quarter, 0.0
-    for n in range(14, 0, -1):
-        series = square * (1 / (2 * n + 1) - series)
-    return 4 * quarter * (1 - series)
+    return jnp.stack([(x_1 + x_2) * 0.5 + drop, angles.angle(half)])

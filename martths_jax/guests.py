@@ -33,15 +33,17 @@ class Copy:
     Attributes:
         file: that was loaded.
         sha256: of its content then.
+        at: where a run's folder has it, relative to the folder, if that is not by its own digest.
     """
 
     file: Path
     sha256: str
+    at: str = ""
 
     @property
     def place(self) -> str:
         """Where a run's folder has it, relative to the folder."""
-        return f"{FILES}/{self.file.stem}-{self.sha256[:12]}.py"
+        return self.at or f"{FILES}/{self.file.stem}-{self.sha256[:12]}.py"
 
     def again(self, text: str) -> str:
         """A text that named something in the file, naming it in the copy."""

@@ -30,10 +30,10 @@ from martths_jax.control.controllers import Controller
 from martths_jax.indices import DEFAULT, Index, choose, trials_first
 from martths_jax.motions import Motion
 from martths_jax.plant import Plants
+from martths_jax.reference import reference_response
 from martths_jax.result import Result
 from martths_jax.runtime import check_runtime
 from martths_jax.sensors import SensorNoise
-from martths_jax.structure.modal import respond
 
 __all__ = [
     "FEW",
@@ -50,12 +50,6 @@ __all__ = [
     "run_block",
     "simulate",
 ]
-
-
-def reference_response(benchmark: Benchmark, acceleration: jax.Array) -> jax.Array:
-    """(N, o) response of the reference structure to (N,) ground acceleration."""
-    load = jnp.zeros((acceleration.shape[0], benchmark.layout.inputs)).at[:, 0].set(acceleration)
-    return respond(benchmark.reference, load)
 
 
 def simulate(

@@ -21,7 +21,7 @@ FLOORS = (
     ("observers",),
     ("indices",),
     ("watch",),
-    ("loop",),
+    ("loop", "reference"),
     ("checks", "result"),
     ("blocks",),
     ("problem",),
@@ -77,6 +77,16 @@ def test_rooms_look_down_only():
             if not (down or (room, other) in BESIDE):
                 wrong.append(f"{where} looks up at {module}")
     assert not wrong, "\n".join(wrong)
+
+
+def test_problem_files_are_read_without_a_rig():
+    """The structural half stands on structures alone, so that others may read such files too."""
+    allowed = {"problem", "structure", "errors", "text", "files"}
+    structural = ("document", "table", "lines", "frame", "sources", "matrices", "damping",
+                  "structure", "template")  # fmt: skip
+    for name in structural:
+        found = {module.split(".")[1] for module in imports(HOUSE / "problem/file" / f"{name}.py")}
+        assert found <= allowed, f"{name} looks at {found - allowed}"
 
 
 def test_every_room_has_a_floor():

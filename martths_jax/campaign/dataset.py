@@ -24,6 +24,7 @@ from martths_jax.campaign.files import writing
 from martths_jax.campaign.store import FORMAT, RunFolder
 from martths_jax.errors import InputError
 from martths_jax.files import forgiving
+from martths_jax.guests import kept
 from martths_jax.problem import Problem, find_problem
 from martths_jax.watch import Status
 
@@ -39,8 +40,10 @@ STATUS_FLAGS = {
 ENCODING = {"_Encoding": "utf-8"}
 #: Longest attribute HDF5 stores in an object's header [bytes].
 LONGEST_ATTRIBUTE = 60_000
+#: Where a dataset's ``encoding`` says what folder it is of.
+FOLDER = "folder"
 #: Problem and case in what identifies a run; they stand near its beginning, before all lists.
-_PROBLEM = re.compile(r'"problem": "(?P<name>[^"]*)", "case": (?P<case>null|\d+)')
+_PROBLEM = re.compile(r'"problem": (?P<name>"[^"]*"), "case": (?P<case>null|\d+)')
 _FIRST_WORDS = {
     "saturated": "valve command beyond its limit",
     "command": "command beyond its range or not a number",
@@ -214,11 +217,16 @@ def controllers_of(dataset: xr.Dataset) -> dict[str, dict]:
 
 
 def problem_of(dataset: xr.Dataset) -> Problem:
-    """What a result file is about: the problem that was tested, by default the maRTHS benchmark."""
+    """What results are about: the problem that was tested, by default the maRTHS benchmark.
+
+    Args:
+        dataset: of ``Results``, which know the folder that keeps a problem's own files.
+    """
     found = _PROBLEM.search(str(dataset.attrs.get("identity", "")))
     if found is None:
         return find_problem()
-    return find_problem(found["name"], None if found["case"] == "null" else int(found["case"]))
+    name = kept(json.loads(found["name"]), Path(dataset.encoding.get(FOLDER, ".")))
+    return find_problem(name, None if found["case"] == "null" else int(found["case"]))
 
 
 def _shortened(text: str) -> str:

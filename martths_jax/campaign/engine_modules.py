@@ -21,6 +21,7 @@ ENGINE_MODULES = (
     "plant.py",
     "problem/*.py",
     "problem/*/*.py",
+    "reference.py",
     "result.py",
     "rig/*.py",
     "rig/*/*.py",

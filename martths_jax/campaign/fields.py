@@ -88,7 +88,7 @@ FIELDS = (
           "be a whole number from 0 to 2^63 - 1",
           "Plant and sensor noise of trial i depend on (seed, i) alone."),
     Field("problem", "study", _is_text, _choice(PROBLEMS),
-          f"What is tested: {', '.join(PROBLEMS)}."),
+          f"What is tested: {', '.join(PROBLEMS)}, or a file that `martths problem init` writes."),
     Field("case", "study", optional(lambda v: is_whole(v, 1)), "be the number of a case",
           "Case of a problem that has several; left out: the first."),
     Field("controllers", "study", _is_list, "be a list of at least one controller",

@@ -80,9 +80,10 @@ class Plan:
 
     @property
     def copies(self) -> list[Copy]:
-        """Files of the user's that controllers and indices were loaded from."""
+        """Files of the user's that controllers, indices and the problem were loaded from."""
         places = files_of(self.config.indices).values()
         found = [*(one.copy for one in self.chosen.values()), *(place.copy for place in places)]
+        found += self.problem.copies
         return [one for one in dict.fromkeys(found) if one is not None]
 
     @property

@@ -101,6 +101,7 @@ def identity(plan: Plan) -> dict:
     found = {k: v for k, v in settings.items() if k not in loaded | RUN_ONLY}
     if plan.draws.table is not None:
         found |= {"trials": plan.trials, "plants_sha256": plan.draws.sha256}
+    found["problem"] = plan.problem.place
     found["controllers"] = list(plan.controllers)
     found["controller"] = plan.controller_settings
     found["indices"] = [index.name for index in plan.indices]

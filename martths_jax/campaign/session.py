@@ -33,6 +33,7 @@ def header(plan: Plan, command_line: str) -> dict:
         else [m.name if isinstance(m, Motion) else m for m in config.motions],
         "controller": plan.tables,
         "indices": plan.index_names,
+        "problem": plan.problem.place,
     }  # fmt: skip
     for name in _NOT_IN_HEADER:
         settings.pop(name)

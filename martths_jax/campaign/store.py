@@ -38,7 +38,7 @@ from martths_jax.campaign.owner import Owner, door
 from martths_jax.campaign.parts import Damaged, read_part
 from martths_jax.campaign.stored import Stored
 from martths_jax.errors import InputError
-from martths_jax.guests import FILES, Copy
+from martths_jax.guests import FILES, Copy, kept
 from martths_jax.problem import Problem, find_problem
 from martths_jax.text import counted
 
@@ -244,14 +244,14 @@ class RunFolder(Stored):
             path = self.path / one.place
             if not (path.is_file() and path.read_bytes() == content):
                 with disk_errors(path):
-                    path.parent.mkdir(exist_ok=True)
+                    path.parent.mkdir(parents=True, exist_ok=True)
                 write_bytes(path, content)
 
     @property
     def problem(self) -> Problem:
         """What was tested."""
         identity = self.header["identity"]
-        return find_problem(identity["problem"], identity["case"])
+        return find_problem(kept(identity["problem"], self.path), identity["case"])
 
     def draws(self) -> Draws:
         """The plants by trial number.

@@ -20,6 +20,8 @@ from martths_jax.errors import InputError, argument_error
 #: What may become of a parameter: it shapes the program, it may differ from trial to trial, or a
 #: tuning may move it as well.
 KINDS = ("static", "lane", "tunable")
+#: ``Parameter.size`` of as many numbers as there are actuators.
+ANY = -1
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Parameter:
         low, high: bounds of a number, themselves allowed if finite; `above` where `low` is not.
         above: whether a number must be larger than `low`.
         whole: whether it is a whole number.
-        size: how many numbers it is; 0 for one.
+        size: how many numbers it is; 0 for one, ``ANY`` for one an actuator.
         choices: the words it may be, if it is a word.
         kind: one of ``KINDS``; `tunable` numbers can be axes of a sweep too, `static` ones if they
             are one number.
@@ -70,7 +72,9 @@ class Parameter:
         if self.choices:
             return f"be one of {', '.join(map(repr, self.choices))}"
         kind = "whole number" if self.whole else "number"
-        many = f"{self.size} {kind}s" if self.size else f"a {kind}"
+        many = f"{self.size} {kind}s" if self.size > 0 else f"a {kind}"
+        if self.size == ANY:
+            many = f"{kind}s, one an actuator,"
         unit = "" if self.unit == "1" else f" ({self.unit})"
         low, high = np.isfinite(self.low), np.isfinite(self.high)
         if low and high:
@@ -95,7 +99,8 @@ class Parameter:
             numbers = np.asarray(value, dtype=float)
         except (TypeError, ValueError):
             return False
-        if numbers.size != max(1, self.size) or not np.all(np.isfinite(numbers)):
+        sized = numbers.size >= 1 if self.size == ANY else numbers.size == max(1, self.size)
+        if not sized or not np.all(np.isfinite(numbers)):
             return False
         bounded = (numbers > self.low if self.above else numbers >= self.low) & (
             numbers <= self.high

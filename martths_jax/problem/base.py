@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from martths_jax.guests import FILES, Copy
 from martths_jax.layout import Layout
 from martths_jax.published import NOTHING, Published
 from martths_jax.sensors import SensorNoise
@@ -49,7 +52,8 @@ class Problem:
         settings: of a study, where its usual ones are other than the maRTHS benchmark's.
         published: what is printed of its nominal plant, for comparison only.
         partitions: ways to part the structure that it offers.
-        identity: what decides its numbers beside this package's code, as JSON can hold it.
+        files: that it was read from, the problem file first; none for those of this package.
+        sha256: digest of those files.
     """
 
     name: str
@@ -67,4 +71,23 @@ class Problem:
     settings: Mapping[str, Any] = field(default_factory=dict)
     published: Published = NOTHING
     partitions: tuple[str, ...] = ("benchmark",)
-    identity: Mapping[str, Any] = field(default_factory=dict)
+    files: tuple[Path, ...] = ()
+    sha256: str = ""
+
+    @property
+    def place(self) -> str:
+        """Name by which a run's folder finds it again: its own, or that of a copy of its file."""
+        return f"{self._folder}/{self.files[0].name}" if self.files else self.name
+
+    @property
+    def copies(self) -> tuple[Copy, ...]:
+        """How a run keeps its files, each as far from the problem file as it is."""
+        return tuple(
+            Copy(file, hashlib.sha256(file.read_bytes()).hexdigest(),
+                 f"{self._folder}/{file.relative_to(self.files[0].parent).as_posix()}")
+            for file in self.files
+        )  # fmt: skip
+
+    @property
+    def _folder(self) -> str:
+        return f"{FILES}/problem-{self.sha256[:12]}"

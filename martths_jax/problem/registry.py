@@ -7,6 +7,7 @@ from functools import cache, partial
 
 from martths_jax.errors import argument_error
 from martths_jax.problem.base import Problem
+from martths_jax.problem.file.problem import file_problem
 from martths_jax.problem.marths import MARTHS
 from martths_jax.problem.uniaxial.problem import uniaxial
 from martths_jax.problem.uniaxial.structure import CASES
@@ -22,14 +23,19 @@ def find_problem(name: str = "marths", case: int | None = None) -> Problem:
     """The problem that is meant.
 
     Args:
-        name: of ``PROBLEMS``.
+        name: of ``PROBLEMS``, or the path of a problem file, FILE.toml.
         case: of those that have cases; the first by default.
 
     Raises:
         InputError: for a name or case that does not exist.
     """
+    if name.endswith(".toml"):
+        if case is not None:
+            raise argument_error("case", "be left out, a file has none", repr(case))
+        return file_problem(name)
     if name not in PROBLEMS:
-        raise argument_error("problem", f"be one of {', '.join(PROBLEMS)}", repr(name))
+        known = ", ".join(PROBLEMS)
+        raise argument_error("problem", f"be one of {known}, or a FILE.toml", repr(name))
     cases = PROBLEMS[name]
     if case is None:
         case = next(iter(cases))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import jax
+import jax.numpy as jnp
 
 MM = 1e3  # mm per m
 
@@ -27,3 +28,7 @@ class Direct:
     def to_frame(self, strokes_mm: jax.Array) -> jax.Array:
         """(n, T) interface motion [m] of strokes (n, T) [mm]."""
         return strokes_mm * (1 / MM)
+
+    def jacobian(self) -> jax.Array:
+        """(n, n) strokes per motion [mm/m]."""
+        return MM * jnp.eye(self.actuators)

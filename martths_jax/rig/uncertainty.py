@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.special import ndtri
 
 from martths_jax.errors import argument_error, as_numbers
 
@@ -107,6 +108,21 @@ class Uncertainty:
         ]
         return jnp.stack(columns, axis=1)
 
+    def draws(self, values, spread=1.0) -> np.ndarray:
+        """(T, p) standard normal draws that give parameters (T, p): the inverse of ``values``.
+
+        On the host.  A uniform parameter outside of its range has none, and gives infinity.
+        """
+        values = np.asarray(values, dtype=float).reshape(-1, len(self))
+        columns = [
+            _draw(self.distributions[i], self.kinds[i], m, self.sigmas[i] * spread, values[:, i])
+            for i, m in enumerate(self.nominal)
+        ]
+        z = np.stack(columns, axis=1) if columns else values
+        if self.correlation is None:
+            return z
+        return np.linalg.solve(np.linalg.cholesky(np.array(self.correlation)), z.T).T
+
     def column(self, values: jax.Array, name: str) -> jax.Array:
         """(T,) values of one parameter out of (T, p).
 
@@ -126,6 +142,19 @@ def _parameter(distribution: str, kind: str, m, sigma, z):
     if distribution == "uniform":
         z = np.sqrt(3) * jax.scipy.special.erf(z * np.sqrt(0.5))
     return m * (1 + sigma * z) if kind == "relative" else m + sigma * z
+
+
+def _draw(distribution: str, kind: str, m: float, sigma: float, x: np.ndarray) -> np.ndarray:
+    """Inverse of ``_parameter``; zero where nothing varies."""
+    if sigma == 0:
+        return np.zeros_like(x)
+    if distribution == "lognormal":
+        share = sigma if kind == "relative" else sigma / abs(m)
+        return np.log(x / m) / float(_log_sigma(share))
+    z = (x / m - 1) / sigma if kind == "relative" else (x - m) / sigma
+    if distribution == "uniform":
+        z = ndtri(0.5 * (1 + z / np.sqrt(3)))
+    return z
 
 
 def _log_sigma(share):

@@ -6,7 +6,7 @@ is left are the coordinates q of the model: M = T' M_free T, K = T' K_free T.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,22 +19,38 @@ from martths_jax.structure.planar import DIRECTIONS, PlanarFrame
 from martths_jax.text import nearest
 
 
+def part_matrices(
+    frame: PlanarFrame, members: Iterable[str], masses: Iterable[tuple[str, float]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """K and M [SI] of a part of a frame on all its degrees of freedom, held ones included.
+
+    Args:
+        frame: the whole.
+        members: names of the part's members.
+        masses: its point masses as (degree of freedom or node, mass) pairs.
+    """
+    names = frame.dofs
+    place = {name: i for i, name in enumerate(names)}
+    K, M = np.zeros((len(names),) * 2), np.zeros((len(names),) * 2)
+    for name in members:
+        member = frame.members[name]
+        k, m = frame.member_matrices(name)
+        at = [place[f"{node}.{d}"] for node in (member.start, member.end) for d in DIRECTIONS]
+        K[np.ix_(at, at)] += k
+        M[np.ix_(at, at)] += m
+    for name, mass in masses:
+        for dof in [name] if name in place else [f"{name}.x", f"{name}.y"]:
+            M[place[dof], place[dof]] += mass
+    return K, M
+
+
 def free_matrices(frame: PlanarFrame) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     """Names of the n degrees of freedom that no support holds, K (n, n) and M (n, n) [SI].
 
     Constraints do not count yet.
     """
     names = frame.dofs
-    place = {name: i for i, name in enumerate(names)}
-    K, M = np.zeros((len(names),) * 2), np.zeros((len(names),) * 2)
-    for name, member in frame.members.items():
-        k, m = frame.member_matrices(name)
-        at = [place[f"{node}.{d}"] for node in (member.start, member.end) for d in DIRECTIONS]
-        K[np.ix_(at, at)] += k
-        M[np.ix_(at, at)] += m
-    for name, mass in frame.masses.items():
-        for dof in [name] if name in place else [f"{name}.x", f"{name}.y"]:
-            M[place[dof], place[dof]] += mass
+    K, M = part_matrices(frame, frame.members, frame.masses.items())
     held = set(frame.held)
     free = [i for i, name in enumerate(names) if name not in held]
     return tuple(names[i] for i in free), K[np.ix_(free, free)], M[np.ix_(free, free)]
@@ -181,7 +197,12 @@ def assemble(frame: PlanarFrame) -> Assembly:
     return Assembly(dofs=dofs, coordinates=coordinates, T=T, M=M_q, K=K_q, free_mass=M)
 
 
-def check_definite(K: np.ndarray, names: Sequence[str], size: np.ndarray | None = None) -> None:
+def check_definite(
+    K: np.ndarray,
+    names: Sequence[str],
+    size: np.ndarray | None = None,
+    what: str = "The frame",
+) -> None:
     """Refuse a stiffness under which some motion meets no resistance, or a negative one.
 
     K is scaled to a unit diagonal first, so that translations and rotations weigh alike.
@@ -191,6 +212,7 @@ def check_definite(K: np.ndarray, names: Sequence[str], size: np.ndarray | None 
         names: of its q coordinates.
         size: (q,) what its diagonal was summed from, in absolute values; a diagonal entry that is
             only round-off of it counts as zero.
+        what: the stiffness is that of, at the start of a sentence.
 
     Raises:
         InputError: naming the coordinates of that motion.
@@ -208,7 +230,7 @@ def check_definite(K: np.ndarray, names: Sequence[str], size: np.ndarray | None 
     shown = ", ".join(moving[:8]) + (f" and {len(moving) - 8} more" if len(moving) > 8 else "")
     if negative:
         raise InputError(f"The stiffness is indefinite: it pushes the motion of {shown} on.")
-    raise InputError(f"The frame is a mechanism: nothing resists the motion of {shown}.")
+    raise InputError(f"{what} is a mechanism: nothing resists the motion of {shown}.")
 
 
 def _moving(vectors: np.ndarray, scale: np.ndarray, names: Sequence[str]) -> list[str]:

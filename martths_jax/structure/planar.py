@@ -21,6 +21,11 @@ FIXED = DIRECTIONS
 PINNED = ("x", "y")
 
 
+def dof_name(text: str) -> str:
+    """Name of a degree of freedom, ``NODE.r`` written in full as ``NODE.rotation``."""
+    return f"{text[:-2]}.rotation" if text.endswith(".r") else text
+
+
 @dataclass(frozen=True)
 class PlanarFrame:
     """A planar frame as data.

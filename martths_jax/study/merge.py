@@ -112,6 +112,7 @@ def engine_again(run: RunFolder, records: str | None, keep, reporter: Reporter):
         name: table | {"kind": kept(table.get("kind", name), run.path)}
         for name, table in settings["controller"].items()
     }
+    settings["problem"] = kept(settings["problem"], run.path)
     settings["indices"] = tuple(kept(text, run.path) for text in settings["indices"])
     for table in settings["controller"].values():
         if table["kind"].startswith(str(run.path)):

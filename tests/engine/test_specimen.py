@@ -5,9 +5,20 @@ from dataclasses import dataclass, replace
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
-from martths_jax import IdealPlants, Passthrough, SensorNoise, build_benchmark, simulate
+from martths_jax import (
+    IdealPlants,
+    InputError,
+    Passthrough,
+    SensorNoise,
+    build_benchmark,
+    simulate,
+)
+from martths_jax.motions import Motion
+from martths_jax.reference import reference_response
 from martths_jax.rig.specimen import History, LinearSpecimen, Specimen
+from martths_jax.structure.modal import to_dense
 from tests.engine.motions import burst
 
 DT = 1 / 1024
@@ -83,3 +94,93 @@ def test_a_specimen_with_a_state_runs_in_the_loop():
         np.testing.assert_allclose(runs[2]["force"][0, k], expected, rtol=1e-7, atol=1e-6)
         before = [q, before[0]]
     assert np.abs(runs[2]["num"] - runs[0]["num"]).max() > 1e-5
+
+
+def in_the_loop(benchmark, **changes):
+    """The benchmark with its specimen as one that has a state, so that it stands in the loop."""
+    own = Remembering(benchmark.specimen, jnp.asarray(2.0), jnp.asarray(0.0))
+    return replace(benchmark, specimen=replace(own, **changes))
+
+
+@pytest.mark.parametrize("integrator", ["newmark", "zoh"])
+def test_the_reference_with_the_specimen_in_the_loop_solves_its_equations(integrator):
+    """Sample by sample with dense matrices: what comes out is what the equations say."""
+    benchmark = in_the_loop(build_benchmark(integrator=integrator), stiffness=jnp.asarray(3e5))
+    ground = burst(1.0).acceleration
+    response = np.asarray(reference_response(benchmark, jnp.asarray(ground)))
+    A, B, C, D = to_dense(benchmark.numerical)
+    taps, x, state = np.asarray(benchmark.specimen.linear.taps), np.zeros(len(A)), 0.0
+    before = [response[0, :2], response[0, :2]]
+    for k, a in enumerate(ground):
+        q = response[k, :2]
+        state = (state + DT * q[0]) / (1 + DT * 2.0)
+        force = taps[0] @ q + taps[1] @ before[0] + taps[2] @ before[1]
+        force[0] += 3e5 * state
+        load = np.array([a, *-force])
+        left = C @ x + D @ load - response[k]
+        assert np.abs(left).max() <= 1e-9 * np.abs(response).max()
+        x, before = A @ x + B @ load, [q, before[0]]
+
+
+def test_a_linear_specimen_in_the_loop_meets_the_reference_as_dt_shrinks():
+    """Consistent partition: all but the rotational masses, which the reference does not have."""
+    errors = []
+    for fs in (1024.0, 4096.0):
+        linear = build_benchmark(fs, partition="consistent")
+        ground = jnp.asarray(burst(2.0, fs).acceleration)
+        one, other = (
+            np.asarray(reference_response(b, ground)) for b in (linear, in_the_loop(linear))
+        )
+        errors.append(np.linalg.norm(one - other) / np.linalg.norm(one))
+    assert errors[1] < 1.5e-4 and errors[0] < 1e-3
+
+
+def test_the_hybrid_loop_meets_the_reference_with_its_specimen():
+    """Ideal actuators and no noise: what is left is their one sample, of first order in dt."""
+    errors = []
+    for fs in (2048.0, 4096.0):
+        benchmark = in_the_loop(
+            build_benchmark(fs, partition="consistent", force_from="measurement"),
+            stiffness=jnp.asarray(3e5),
+        )
+        t = np.arange(round(fs)) / fs
+        ground = np.sin(2 * np.pi * 2 * t) ** 3 * np.minimum(1, 4 * t) ** 3
+        run = simulate(
+            benchmark, Passthrough(), IdealPlants(np.zeros(1, int)), Motion("sine", ground, fs),
+            SensorNoise(0.0), keep=True,
+        )  # fmt: skip
+        reference = np.asarray(run.reference)
+        apart = np.abs(run.signals["num"][0] - reference).max(0)
+        errors.append(apart / np.abs(reference).max(0))
+    np.testing.assert_allclose(np.log2(errors[0] / errors[1]), 1.0, atol=0.2)
+    assert np.all(errors[1] < 1e-2)
+
+
+def test_the_work_on_a_specimen_is_stored_or_dissipated():
+    """f = K q + C v: the work over a path is K q^2 / 2 at its end and the integral of C v^2."""
+    fs, K, C = 8192.0, 4e5, 3e3
+    specimen = LinearSpecimen.of(*(np.array([[x]]) for x in (0.0, C, K)), 1 / fs)
+    t = np.arange(int(2 * fs)) / fs
+    q = 1e-3 * np.sin(2 * np.pi * 1.7 * t) * t
+    force = [float(specimen.step((), one, 1 / fs)[1][0, 0]) for one in histories(q[:, None])]
+    work = np.sum((np.array(force)[1:] + force[:-1]) / 2 * np.diff(q))
+    lost = np.sum(C * np.diff(q) ** 2 * fs)
+    np.testing.assert_allclose(work, K * q[-1] ** 2 / 2 + lost, rtol=2e-3)
+
+
+def test_a_specimen_without_a_solution_is_refused():
+    """A force that no motion answers to: the sample and what is left stand in the sentence."""
+
+    @jax.tree_util.register_dataclass
+    @dataclass(frozen=True)
+    class Broken(Specimen):
+        linear: LinearSpecimen
+
+        def step(self, state, history, dt):
+            _, force = self.linear.step((), history, dt)
+            return state, force * jnp.where(jnp.abs(history.now[0, 0]) > 1e-5, jnp.nan, 1.0)
+
+    benchmark = build_benchmark()
+    broken = replace(benchmark, specimen=Broken(benchmark.specimen))
+    with pytest.raises(InputError, match=r"specimen Broken cannot be found: at sample \d+"):
+        reference_response(broken, jnp.asarray(burst(1.0).acceleration))

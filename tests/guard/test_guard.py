@@ -24,6 +24,7 @@ from martths_jax.control.adaptive.differences import BACKWARD_DIFFERENCES
 from martths_jax.control.adaptive.inverse import nominal_inverse
 from martths_jax.control.controllers import adfc
 from martths_jax.control.controllers.adfc import CONDITION_LIMIT
+from martths_jax.control.controllers.feedforward import follow_target
 from martths_jax.indices import trials_last
 from martths_jax.transfer import frequency_response
 from tests.engine.motions import burst
@@ -105,8 +106,8 @@ def test_a_fit_beyond_the_condition_limit_is_held(benchmark, monkeypatch):
     held = simulate(benchmark, controller, nominal_plant(), shaken, keep=True)
     blocks.compiled.cache_clear()
     assert held.counts["held"].tolist() == [len(range(80 + 4, 400))]
-    assert np.all(held.signals["C_A"] == adfc.FOLLOW_TARGET)
-    assert not np.allclose(free.signals["C_A"][0, -1], adfc.FOLLOW_TARGET)
+    assert np.all(held.signals["C_A"] == follow_target(4, joint=True))
+    assert not np.allclose(free.signals["C_A"][0, -1], follow_target(4, joint=True))
 
 
 @pytest.mark.parametrize("solver", sorted(ls.SOLVERS))

@@ -17,35 +17,35 @@ SHAPES = ("number", "unknowns", "coefficients")
 MATRICES = ("number", "unknowns", "matrix", "matrices")
 
 
-def per_part(value, columns: int, joint: bool) -> jax.Array:
+def per_part(value, columns: int, joint: bool, actuators: int = ACTUATORS) -> jax.Array:
     """A symmetric matrix for each part, (parts, n, n) or (parts, n, n, T).
 
     Args:
         value: such an array, or one number, n numbers of a diagonal, or a matrix (n, n), the same
             for all parts.
-        columns, joint: see ``parts_of``.
+        columns, joint, actuators: see ``parts_of``.
     """
     value = jnp.asarray(value, dtype=float)
     if value.ndim > 2:
         return value
-    parts = parts_of(columns, joint)
+    parts = parts_of(columns, joint, actuators)
     n = parts[0].unknowns
     matrix = value if value.ndim == 2 else jnp.diag(jnp.broadcast_to(value, (n,)))
     return jnp.broadcast_to(matrix, (len(parts), n, n))
 
 
-def per_coefficient(value, columns: int, joint: bool) -> jax.Array:
-    """One number a coefficient, (n, 2) or (n, 2, T).
+def per_coefficient(value, columns: int, joint: bool, actuators: int = ACTUATORS) -> jax.Array:
+    """One number a coefficient, (n, actuators) or (n, actuators, T).
 
     Args:
-        value: such an array, or one number, or n numbers, the same for both actuators.
-        columns, joint: see ``parts_of``.
+        value: such an array, or one number, or n numbers, the same for all actuators.
+        columns, joint, actuators: see ``parts_of``.
     """
     value = jnp.asarray(value, dtype=float)
-    n = parts_of(columns, joint)[0].unknowns
+    n = parts_of(columns, joint, actuators)[0].unknowns
     if value.ndim < 2:
         value = jnp.broadcast_to(value, (n,))[:, None]
-        value = jnp.broadcast_to(value, (n, ACTUATORS))
+        value = jnp.broadcast_to(value, (n, actuators))
     return value
 
 
@@ -79,15 +79,15 @@ def check_shape(name: str, value, parts: Sequence[Part], shapes: Sequence[str]) 
         name: of the argument.
         value: it.
         parts: of the controller.
-        shapes: those allowed, of ``number``, ``unknowns``, ``coefficients`` (n, 2), ``matrix``
-            (n, n), ``matrices`` (parts, n, n); the last may have one value a trial too.
+        shapes: those allowed, of ``number``, ``unknowns``, ``coefficients`` (n, actuators),
+            ``matrix`` (n, n), ``matrices`` (parts, n, n); the last may have one value a trial too.
     """
     number = known(value)
     if number is None:
         return []
-    n = parts[0].unknowns
+    n, actuators = parts[0].unknowns, sum(len(part.sides) for part in parts)
     sizes = {
-        "number": (), "unknowns": (n,), "coefficients": (n, ACTUATORS), "matrix": (n, n),
+        "number": (), "unknowns": (n,), "coefficients": (n, actuators), "matrix": (n, n),
         "matrices": (len(parts), n, n),
     }  # fmt: skip
     allowed = [sizes[s] for s in shapes]

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from martths_jax.benchmark import Benchmark
     from martths_jax.control.controllers.feedforward import AdaptiveFeedforward
 
-#: Strokes that are commanded.
+#: Strokes that are commanded, where nothing else is said.
 ACTUATORS = 2
 
 #: Coefficients C: row j holds that of regressor j for each side, (T,) each.
@@ -56,22 +56,23 @@ class Part:
     values: tuple[int, ...]
 
     def columns(self, array: jax.Array) -> Coefficients:
-        """Its columns of an array (unknowns, 2, ...), one column an actuator."""
+        """Its columns of an array (unknowns, actuators, ...), one column an actuator."""
         return tuple(tuple(array[j, i] for i in self.sides) for j in range(self.unknowns))
 
 
-def parts_of(columns: int, joint: bool) -> tuple[Part, ...]:
+def parts_of(columns: int, joint: bool, actuators: int = ACTUATORS) -> tuple[Part, ...]:
     """The least-squares problems of a controller.
 
     Args:
         columns: regressors a stroke.
         joint: one over all strokes, or one an actuator.
+        actuators: number of strokes.
     """
-    actuators = range(ACTUATORS)
+    each = range(actuators)
     if joint:
-        values = tuple(columns * i for i in actuators)
-        return (Part(0, columns * ACTUATORS, tuple(actuators), values),)
-    return tuple(Part(i, columns, (i,), (0,)) for i in actuators)
+        values = tuple(columns * i for i in each)
+        return (Part(0, columns * actuators, tuple(each), values),)
+    return tuple(Part(i, columns, (i,), (0,)) for i in each)
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,7 @@ class Regressor(Piece, ABC):
         return self.matrix.shape[1] - 1
 
     @abstractmethod
-    def init(self, trials: int) -> Any:
+    def init(self, trials: int, actuators: int = ACTUATORS) -> Any:
         """What is remembered of the samples before the first."""
 
     @abstractmethod
@@ -165,7 +166,7 @@ class Regressor(Piece, ABC):
 
         Args:
             before: what was remembered of the samples before.
-            newest_mm: (2, T) strokes of this sample [mm].
+            newest_mm: (actuators, T) strokes of this sample [mm].
 
         Returns:
             what to remember; for each stroke its n regressors (T,).

@@ -56,9 +56,9 @@ class BackwardDifferences(Regressor):
         weights = [(*row, *(0.0,) * (taps - len(row))) for row in self.powers]
         return np.array(weights) @ each
 
-    def init(self, trials):
+    def init(self, trials, actuators=ACTUATORS):
         """For each stroke D^0 x, D^1 x, ... of the sample before."""
-        return ((jnp.zeros(trials),) * self.reach,) * ACTUATORS
+        return ((jnp.zeros(trials),) * self.reach,) * actuators
 
     def step(self, before, newest_mm):
         """D^n at a sample is D^(n-1) less D^(n-1) of the sample before."""

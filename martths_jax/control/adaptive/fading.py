@@ -50,7 +50,7 @@ class Fading(Fit):
         return 1 / (1 - self.forgetting)
 
     def prepare(self, benchmark, controller):
-        sizes = controller.regressor.columns, controller.joint
+        sizes = controller.sizes
         start = per_coefficient(controller.start, *sizes)
         return replace(self, prior=per_part(self.prior, *sizes), start=start)
 

@@ -32,7 +32,7 @@ class NormalisedGradient(Fit):
     shared_axes = MappingProxyType({"gain": 2})
 
     def prepare(self, benchmark, controller):
-        sizes = controller.regressor.columns, controller.joint
+        sizes = controller.sizes
         return replace(self, gain=per_coefficient(self.gain, *sizes))
 
     def problems(self, controller):

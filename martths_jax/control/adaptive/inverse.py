@@ -44,15 +44,16 @@ def nominal_inverse(
         points: frequencies of the mean.
 
     Returns:
-        (2 d, 2) coefficients.
+        (n d, n) coefficients of n actuators.
     """
     A, B, C, _ = to_dense(model)
     d, taps = differences.shape
+    n = len(C)
     z = np.exp(2j * np.pi * np.linspace(0, min(band_hz, fs / 2), points + 1)[1:] / fs)
     H = C @ np.linalg.solve(z[:, None, None] * np.eye(len(A)) - A, B)  # (points, stroke, command)
     of_unit = z[:, None] ** -np.arange(taps) @ differences.T  # (points, d)
-    phi = (H[:, :, None, :] * of_unit[:, None, :, None]).reshape(points, 2 * d, 2)
+    phi = (H[:, :, None, :] * of_unit[:, None, :, None]).reshape(points, n * d, n)
     G = np.mean(phi @ phi.conj().swapaxes(1, 2), axis=0).real
     h = np.mean(phi * z[:, None, None], axis=0).real  # u(k-1) is u(k) / z
-    noise = np.kron(np.eye(2), differences @ differences.T)
+    noise = np.kron(np.eye(n), differences @ differences.T)
     return np.linalg.solve(G + noise_share * noise, h)

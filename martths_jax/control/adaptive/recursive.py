@@ -29,7 +29,7 @@ class _Corrected(Fit):
     """What both have in common: state is P, the upper triangle row by row."""
 
     def prepare(self, benchmark, controller):
-        sizes = controller.regressor.columns, controller.joint
+        sizes = controller.sizes
         made = {
             n: per_part(getattr(self, n), *sizes) for n in ("prior", "walk") if hasattr(self, n)
         }

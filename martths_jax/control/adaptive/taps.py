@@ -31,9 +31,9 @@ class TapMap(Regressor):
         good = same and np.all(np.isfinite(self.matrix)) and np.all(np.any(self.matrix, axis=1))
         return complaint(good, "rows", "be rows of equally many numbers, none all zero", self.rows)
 
-    def init(self, trials):
+    def init(self, trials, actuators=ACTUATORS):
         """For each stroke x(k-1), x(k-2), ..."""
-        return ((jnp.zeros(trials),) * self.reach,) * ACTUATORS
+        return ((jnp.zeros(trials),) * self.reach,) * actuators
 
     def step(self, before, newest_mm):
         kept, phi = [], []

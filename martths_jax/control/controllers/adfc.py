@@ -19,6 +19,7 @@ import numpy as np
 
 from martths_jax.algebra import least_squares as ls
 from martths_jax.control.adaptive.arguments import known
+from martths_jax.control.adaptive.base import ACTUATORS
 from martths_jax.control.adaptive.differences import BackwardDifferences
 from martths_jax.control.adaptive.guards import ConditionGate, Pull
 from martths_jax.control.adaptive.inverse import nominal_inverse
@@ -36,7 +37,6 @@ from martths_jax.errors import argument_error, raise_all
 #: Value and three derivatives of both strokes.
 REGRESSOR = BackwardDifferences(order=3, accuracy=2)
 #: Coefficients that do nothing: u follows x_a.
-FOLLOW_TARGET = follow_target(REGRESSOR.columns, joint=True)
 #: Pull towards the inverse plant that keeps every trial (docs/guarded_adfc.md has the evidence)
 #: [mm^2].
 GUARD_PULL = 6e-5
@@ -65,6 +65,7 @@ class ADFC(Controller):
         anchor: (8, 2) coefficients of one's own to pull to, instead of those.
         solver: ``ldl`` (unrolled, fast) or ``lu`` (``jnp.linalg.solve``, the reference).
         estimator: the Kalman filter, designed by ``prepare``.
+        actuators: number m of strokes, by ``prepare``; with other than two, 8 is 4 m and 2 is m.
 
     Scalars may be given as arrays over trials (T,), `start` and `anchor` as (8, 2, T).  A fit whose
     normal matrix is singular or worse conditioned than 1e14 leaves the last good coefficients in
@@ -80,6 +81,7 @@ class ADFC(Controller):
     anchor: jax.Array | None = None
     solver: str = field(default="ldl", metadata={"static": True})
     estimator: Any = None
+    actuators: int = field(default=ACTUATORS, metadata={"static": True})
 
     name = "adfc"
     adapts = True
@@ -100,10 +102,11 @@ class ADFC(Controller):
             start=self.start,
             q=self.q,
             estimator=self.estimator,
+            actuators=self.actuators,
         )
 
     def problems(self, benchmark):
-        whole = self.composed()
+        whole = self.composed().sized(benchmark)
         found = whole.fit.problems(whole)
 
         def expect(good, name, wanted, got):
@@ -121,13 +124,15 @@ class ADFC(Controller):
             value = known(getattr(self, name))
             if value is None or value.dtype == object:
                 continue
-            good = value.shape[:2] == (8, 2) and value.ndim in (2, 3)
-            expect(good, name, "be (8, 2)", f"shape {value.shape}")
+            shape = whole.parts[0].unknowns, whole.actuators
+            good = value.shape[:2] == shape and value.ndim in (2, 3)
+            expect(good, name, f"be {shape}", f"shape {value.shape}")
             expect(np.all(np.isfinite(value)), name, "be finite", "NaN or infinity")
         return found
 
     def prepare(self, benchmark):
-        start = FOLLOW_TARGET if self.start is None else self.start
+        own = self.composed().sized(benchmark)
+        start = follow_target(*own.sizes) if self.start is None else self.start
         towards = self.towards or ("inverse" if self.pull is None else "start")
         anchor = self.anchor
         if anchor is None and towards == "start":
@@ -141,6 +146,7 @@ class ADFC(Controller):
             start=jnp.asarray(start, dtype=float),
             anchor=jnp.asarray(anchor, dtype=float),
             estimator=design_kalman(benchmark.plant_model, self.q, benchmark.r_mm2),
+            actuators=own.actuators,
         )
 
     def frozen(self, benchmark, coefficients):

@@ -64,14 +64,15 @@ class AdaptiveFeedforward(Controller):
         fit: coefficients from what was seen.
         guards: applied in this order.
         law: the command from coefficients and target.
-        start: (2 n, 2) coefficients until the first fit, (n, 2) one column an actuator where each
-            has its own; None follows the target (u = x_a).
-        joint: one problem over both strokes (2 n unknowns, 2 sides); False is one an actuator
+        start: (m n, m) coefficients of m actuators until the first fit, (n, m) one column an
+            actuator where each has its own; None follows the target (u = x_a).
+        joint: one problem over all strokes (m n unknowns, m sides); False is one an actuator
             (n unknowns, 1 side).
         learns_from: the strokes that it is taught by, ``estimate`` or ``measurement``.
         low_pass: filter of those strokes and of the commands that go with them.
         q: process noise of the Kalman filter [mm^2].
         estimator: another than that filter; designed by ``prepare`` where there is none.
+        actuators: number m of strokes, by ``prepare``.
     """
 
     regressor: Regressor = field(default=BackwardDifferences(), metadata={"static": True})
@@ -84,6 +85,7 @@ class AdaptiveFeedforward(Controller):
     low_pass: LowPass | None = field(default=None, metadata={"static": True})
     q: jax.Array | float = 3e-5
     estimator: Any = None
+    actuators: int = field(default=ACTUATORS, metadata={"static": True})
 
     name = "feedforward"
     adapts = True
@@ -93,9 +95,23 @@ class AdaptiveFeedforward(Controller):
     @property
     def parts(self) -> tuple[Part, ...]:
         """Its least-squares problems."""
-        return parts_of(self.regressor.columns, self.joint)
+        return parts_of(*self.sizes)
+
+    @property
+    def sizes(self) -> tuple[int, bool, int]:
+        """Arguments of ``parts_of``."""
+        return self.regressor.columns, self.joint, self.actuators
+
+    def sized(self, benchmark) -> AdaptiveFeedforward:
+        """The controller for as many actuators as a benchmark has; the same without one."""
+        if benchmark is None:
+            return self
+        return replace(self, actuators=len(benchmark.layout.actuators))
 
     def problems(self, benchmark):
+        return self.sized(benchmark)._problems()
+
+    def _problems(self) -> list[str]:
         pieces = {"regressor": self.regressor, "fit": self.fit, "law": self.law}
         pieces |= {f"guards[{i}]": guard for i, guard in enumerate(self.guards)}
         if self.low_pass is not None:
@@ -123,18 +139,18 @@ class AdaptiveFeedforward(Controller):
         ]  # fmt: skip
 
     def prepare(self, benchmark):
-        n = self.regressor.columns
+        own = self.sized(benchmark)
         estimator = self.estimator
         if estimator is None:
             estimator = design_kalman(benchmark.plant_model, self.q, benchmark.r_mm2)
-        start = follow_target(n, self.joint) if self.start is None else self.start
-        ready = replace(self, estimator=estimator, start=per_coefficient(start, n, self.joint))
+        start = follow_target(*own.sizes) if self.start is None else self.start
+        ready = replace(own, estimator=estimator, start=per_coefficient(start, *own.sizes))
         fit = ready.fit.prepare(benchmark, ready)
         guards = tuple(guard.prepare(benchmark, ready) for guard in ready.guards)
         return replace(ready, fit=fit, guards=guards, law=ready.law.prepare(benchmark, ready))
 
     def frozen(self, benchmark, coefficients):
-        """The same feedforward with (n, 2) or (n, 2, T) coefficients that stay."""
+        """The same feedforward with coefficients (n, m) or (n, m, T) that stay."""
         ready = self.prepare(benchmark)
         return FrozenFeedforward(
             jnp.asarray(coefficients, dtype=float), ready.estimator, self.regressor, self.joint,
@@ -153,28 +169,28 @@ class AdaptiveFeedforward(Controller):
             # What the regressors remember of the strokes that are learnt from, of those that leave
             # the fit's memory, and of the targets.
             "taught": self.init_taught(trials),
-            "leaving": self.regressor.init(trials) if self.fit.memory else (),
-            "target": self.regressor.init(trials),
-            "command": (zero,) * ACTUATORS,
-            "heard": self.low_pass.init((ACTUATORS, trials)) if self.low_pass else (),
+            "leaving": self.regressor.init(trials, self.actuators) if self.fit.memory else (),
+            "target": self.regressor.init(trials, self.actuators),
+            "command": (zero,) * self.actuators,
+            "heard": self.low_pass.init((self.actuators, trials)) if self.low_pass else (),
             # Fits that were not used so far.
             "held": zero,
         }
 
     def init_taught(self, trials: int):
         """What is remembered of the strokes that are learnt from."""
-        memory = self.low_pass.init((ACTUATORS, trials)) if self.low_pass else ()
-        return memory, self.regressor.init(trials)
+        memory = self.low_pass.init((self.actuators, trials)) if self.low_pass else ()
+        return memory, self.regressor.init(trials, self.actuators)
 
     def taught(self, before, x_m: jax.Array, x_hat: jax.Array):
         """What a sample's strokes teach.
 
         Args:
             before: what was remembered, at first from ``init_taught``.
-            x_m, x_hat: (2, T) x_m(k), x_hat(k).
+            x_m, x_hat: (m, T) x_m(k), x_hat(k).
 
         Returns:
-            what to remember; (2, T) strokes [mm]; for each its regressors (T,).
+            what to remember; (m, T) strokes [mm]; for each its regressors (T,).
         """
         memory, past = before
         strokes = x_m if self.learns_from == "measurement" else x_hat
@@ -186,7 +202,7 @@ class AdaptiveFeedforward(Controller):
     def delay_line(self, trials):
         if not self.fit.memory:
             return None
-        return DelayLine(self.fit.memory, jnp.zeros((2 * ACTUATORS, trials)), self.renew)
+        return DelayLine(self.fit.memory, jnp.zeros((2 * self.actuators, trials)), self.renew)
 
     def renew(self, state):
         """The state after as many samples as the delay line is long."""
@@ -196,7 +212,7 @@ class AdaptiveFeedforward(Controller):
         taught, strokes, phi = self.taught(state["taught"], seen.x_m, seen.x_hat)
         left, leaving, phi_leaving = seen.delayed, (), None
         if self.fit.memory:
-            leaving, phi_leaving = self.regressor.step(state["leaving"], left[:ACTUATORS])
+            leaving, phi_leaving = self.regressor.step(state["leaving"], left[: self.actuators])
         target, phi_target = self.regressor.step(state["target"], seen.x_a)
 
         # u(k-1) is the last command that the strokes at k can have felt.
@@ -209,7 +225,7 @@ class AdaptiveFeedforward(Controller):
         for part in self.parts:
             pair = Pair(seen.k, seen.dt, self._of(part, phi), [applied[i] for i in part.sides])
             if phi_leaving is not None:
-                values = [left[ACTUATORS + i] for i in part.sides]
+                values = [left[self.actuators + i] for i in part.sides]
                 pair = replace(pair, phi_leaving=self._of(part, phi_leaving), values_leaving=values)
             found, fit, guard, held = self._identify(state, part, pair, due, held)
             columns.append(found)
@@ -258,10 +274,14 @@ class AdaptiveFeedforward(Controller):
         return choose(use, proposed, last), self.fit.keep(use, learnt, before), seen, held
 
 
-def follow_target(columns: int, joint: bool) -> np.ndarray:
-    """(n, 2) coefficients that do nothing, u = x_a, where the first regressor is the stroke."""
-    nothing = np.zeros((parts_of(columns, joint)[0].unknowns, ACTUATORS))
-    for part in parts_of(columns, joint):
+def follow_target(columns: int, joint: bool, actuators: int = ACTUATORS) -> np.ndarray:
+    """(n, m) coefficients that do nothing, u = x_a, where the first regressor is the stroke.
+
+    Arguments as of ``parts_of``.
+    """
+    parts = parts_of(columns, joint, actuators)
+    nothing = np.zeros((parts[0].unknowns, actuators))
+    for part in parts:
         for row, side in zip(part.values, part.sides, strict=True):
             nothing[row, side] = 1.0
     return nothing

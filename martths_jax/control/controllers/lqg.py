@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
@@ -12,13 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 from scipy import linalg
 
-from martths_jax.benchmark import Benchmark
+from martths_jax.benchmark import LAYOUT, Benchmark
 from martths_jax.control.base import Controller, Decision
 from martths_jax.control.design.closed_loop import lowest_stable_rate, nominal_radius
 from martths_jax.control.design.lqg import WEIGHTS, kalman_gain, tracking_gains
-from martths_jax.control.entry import Entry, Parameter
+from martths_jax.control.entry import ANY, Entry, Parameter
 from martths_jax.control.estimators import KalmanFilter, design_kalman
-from martths_jax.errors import argument_error, as_numbers
+from martths_jax.errors import InputError, argument_error, as_numbers
 from martths_jax.runtime import check_precision, check_runtime
 from martths_jax.structure.modal import contract
 
@@ -45,8 +45,8 @@ class LQG(Controller):
     """u(k) = -K_z z_hat(k) - K_e e(k), with e(k) = e(k-1) + dt (x_a(k) - x(k)).
 
     Attributes:
-        K_z: (2, 2, m) or (2, 2, m, T) gain on the estimated plant state, slot by slot.
-        K_e: (2, 2) or (2, 2, T) gain on the integral of the tracking error [1/s].
+        K_z: (n, 2, m) or (n, 2, m, T) gain on the estimated plant state, slot by slot; n actuators.
+        K_e: (n, n) or (n, n, T) gain on the integral of the tracking error [1/s].
         estimator: the Kalman filter.
         weights: what the gains were designed from, for the record.
         error: what x is, and so which error is integrated: the ``measured`` strokes x_m, or the
@@ -67,35 +67,36 @@ class LQG(Controller):
         cls,
         benchmark,
         *,
-        e: tuple[float, float] | None = None,
-        r: tuple[float, float] | None = None,
-        y: tuple[float, float] | None = None,
+        e: Sequence[float] | None = None,
+        r: Sequence[float] | None = None,
+        y: Sequence[float] | None = None,
         q: float | None = None,
         error: str = "estimate",
         allow_unstable: bool = False,
     ) -> LQG:
         """Gains from the continuous-time Riccati equation of the plant with integral action.
 
-        Minimises the integral of y_1 x_1^2 + y_2 x_2^2 + e' diag(e) e + u' diag(r) u for the
-        augmented state (z, e), e' = x_a - C z.
+        Minimises the integral of x' diag(y) x + e' diag(e) e + u' diag(r) u for the augmented
+        state (z, e), e' = x_a - C z.
 
         Args:
             benchmark: gives the nominal plant and the sensor noise.
-            e: weights of the two integrated errors [1/s^2].
-            r: weights of the two commands [-].
-            y: weights of the two strokes [-].
+            e: weights of the integrated errors, one an actuator [1/s^2].
+            r: weights of the commands [-].
+            y: weights of the strokes [-].
             q: process noise of the Kalman filter [mm^2].
             error: integrate that of the ``estimate`` or of the ``measured`` strokes.
             allow_unstable: return a design whose loop runs away on the benchmark's own plant, too.
 
         The published weights are not known.  Those left out are ``FITTED`` for `error`: the
         least-squares fit of e, r and y to Table 4's LQG column, which says next to nothing of q.
-        The Riccati equation is the same for both errors, as it knows no noise.
+        The Riccati equation is the same for both errors, as it knows no noise.  For another problem
+        than the one of the fit all weights have to be given.
 
         Raises:
             InputError: if a weight is not positive (y may be zero) or traced, no solution exists,
-                `error` is neither of the two, or the loop is unstable on the benchmark's own plant
-                at its sampling rate.
+                `error` is neither of the two, or the loop is unstable on the maRTHS benchmark's own
+                plant at its sampling rate; of another problem's loop ``stability`` tells.
         """
         check_runtime()
         if not isinstance(benchmark, Benchmark):
@@ -104,13 +105,21 @@ class LQG(Controller):
         if error not in FITTED:
             raise argument_error("error", f"be one of {sorted(FITTED)}", repr(error))
         given = {"e": e, "r": r, "y": y, "q": q}
-        given = FITTED[error] | {name: w for name, w in given.items() if w is not None}
+        given = {name: w for name, w in given.items() if w is not None}
+        if benchmark.layout == LAYOUT:
+            given = FITTED[error] | given
+        elif missing := [name for name in "eryq" if name not in given]:
+            raise argument_error(
+                ", ".join(missing), "be given for a problem other than the maRTHS benchmark",
+                "nothing", "The default weights are a fit to that benchmark's table.",
+            )  # fmt: skip
         e, r, y, q = (given[name] for name in "eryq")
-        check_weights(e, r, y, q)
+        i = len(benchmark.layout.actuators)
+        check_weights(e, r, y, q, i)
         A, B, C = benchmark.plant_continuous
         n = A.shape[0]
-        A_aug = np.block([[A, np.zeros((n, 2))], [-C, np.zeros((2, 2))]])
-        B_aug = np.vstack([B, np.zeros((2, 2))])
+        A_aug = np.block([[A, np.zeros((n, i))], [-C, np.zeros((i, i))]])
+        B_aug = np.vstack([B, np.zeros((i, i))])
         Q = linalg.block_diag(C.T @ np.diag(y) @ C, np.diag(e))
         try:
             with np.errstate(all="ignore"):
@@ -120,7 +129,7 @@ class LQG(Controller):
                 "e, r, y", "give a solvable Riccati equation", f"e={e}, r={r}, y={y} ({reason})"
             ) from None
         K = np.linalg.solve(np.diag(r), B_aug.T @ X)
-        K_z = np.swapaxes(K[:, :n].reshape(2, n // 2, 2), 1, 2)
+        K_z = np.swapaxes(K[:, :n].reshape(i, n // 2, 2), 1, 2)
         with jax.ensure_compile_time_eval():  # the numbers are known, under jit too
             made = cls(
                 K_z=jnp.asarray(K_z),
@@ -129,7 +138,7 @@ class LQG(Controller):
                 weights=(("e", tuple(e)), ("r", tuple(r)), ("y", tuple(y)), ("q", float(q))),
                 error=error,
             )
-        if not allow_unstable:
+        if not allow_unstable and benchmark.layout == LAYOUT:
             refuse_unstable(benchmark, made, q)
         return made
 
@@ -143,7 +152,7 @@ class LQG(Controller):
         return replace(self, weights=())
 
     def init(self, trials):
-        return jnp.zeros((2, trials))
+        return jnp.zeros((self.K_e.shape[0], trials))
 
     def step(self, state, seen):
         reached = seen.x_m if self.error == "measured" else seen.x_hat
@@ -161,6 +170,8 @@ def _pairs(w) -> dict:
 
 
 def _traced(benchmark, *, e1, e2, r2, y1, y2, q, error: str = "estimate") -> LQG:
+    if len(benchmark.layout.actuators) != 2:
+        raise InputError("LQG's weights can be tuned for two actuators only; give them instead.")
     values = {"e1": e1, "e2": e2, "r2": r2, "y1": y1, "y2": y2, "q": q}
     logs = {name: jnp.log10(value) for name, value in values.items()}
     return lqg_from_weights(benchmark, logs, error)
@@ -185,9 +196,9 @@ ENTRY = Entry(
     paper="Condori Uribe et al. 2023, sample controller of the benchmark",
     parameters=(
         Parameter("e", "e", "weights of the integrated errors", None, "1/s^2", 0.0, above=True,
-                  size=2),
-        Parameter("r", "r", "weights of the commands", None, "1", 0.0, above=True, size=2),
-        Parameter("y", "y", "weights of the strokes", None, "1", 0.0, size=2),
+                  size=ANY),
+        Parameter("r", "r", "weights of the commands", None, "1", 0.0, above=True, size=ANY),
+        Parameter("y", "y", "weights of the strokes", None, "1", 0.0, size=ANY),
         Parameter("q", "q", "process noise", None, "mm^2", 0.0, above=True),
         Parameter("error", "", "error that is integrated", "estimate", choices=tuple(FITTED),
                   kind="static"),
@@ -231,17 +242,19 @@ def lqg_from_weights(
     return LQG(K_z=K_z, K_e=K_e, estimator=estimator, error=error)
 
 
-def check_weights(e, r, y, q) -> None:
-    """Refuse weights of ``LQG.design`` that are no numbers or out of range.
+def check_weights(e, r, y, q, actuators: int) -> None:
+    """Refuse weights of ``LQG.design`` that are no numbers, out of range or not one an actuator.
 
     Raises:
         InputError: naming the first such weight.
     """
     for name, given, shape, low in (
-        ("e", e, (2,), 0.0), ("r", r, (2,), 0.0), ("y", y, (2,), -1e-300), ("q", q, (), 0.0),
+        ("e", e, (actuators,), 0.0), ("r", r, (actuators,), 0.0), ("y", y, (actuators,), -1e-300),
+        ("q", q, (), 0.0),
     ):  # fmt: skip
-        count = "two" if shape else "a"
-        wanted = f"be {count} {'positive' if low == 0 else 'non-negative'} number{'s' * len(shape)}"
+        count = {2: "two"}.get(actuators, str(actuators)) if shape else "a"
+        plural = "s" if shape and actuators > 1 else ""
+        wanted = f"be {count} {'positive' if low == 0 else 'non-negative'} number{plural}"
         if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(given)):
             raise argument_error(
                 name, wanted, "a traced value",

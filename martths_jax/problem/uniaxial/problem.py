@@ -67,7 +67,7 @@ def uniaxial(case: int, loop: Loop = PACKAGE) -> Problem:
         plants=lambda draws, trial, spread: plants.TransferPlants(draws, trial, model, spread),
         draw=partial(plants.draw, model),
         check=plants.check,
-        readings={"values": Reading("_value", partial(_draws, model))},
+        readings={"values": Reading("_value", model.uncertainty.draws)},
         stored=("plant_value", "uncertain parameters of the plant: a3, b1 [1/s], b2 [1/s2], "
                 "k_e [N/m]", "SI"),
         noise=_noise,
@@ -81,11 +81,6 @@ def uniaxial(case: int, loop: Loop = PACKAGE) -> Problem:
 
 def _noise(power: float, shared: bool, seed: int) -> SensorNoise:
     return SensorNoise(power, shared, seed, actuators=1, load_cells=1, force_power=NOISE_N2)
-
-
-def _draws(model, values: np.ndarray, spread: float) -> np.ndarray:
-    uncertain = model.uncertainty
-    return (values - np.array(uncertain.nominal)) / (np.array(uncertain.sigmas) * spread)
 
 
 def _build(
@@ -113,16 +108,15 @@ def _build(
     whole, own = structure.reference(case), structure.numerical(case, loop)
     at = partial(discretise, integrator=method, dt=dt, ports=structure.PORTS)
     A, B, C = nominal.continuous()
+    discrete = _shared(nominal.discretise(dt))
     row = np.eye(1)
     return Benchmark(
         fs=float(fs),
         numerical=at(own, delay=TARGET_DELAY),
         reference=at(whole),
-        specimen=LinearSpecimen.of(
-            loop.mass * row, loop.damping * row, loop.stiffness * row, dt
-        ),
+        specimen=LinearSpecimen.of(loop.mass * row, loop.damping * row, loop.stiffness * row, dt),
         coupler=Direct(1),
-        plant_model=_first_row(nominal.discretise(dt)),
+        plant_model=replace(discrete, C=discrete.C[:1]),
         plant_continuous=(A, B, C[:1]),
         noise_power=NOISE_MM2,
         force_from=force_from,
@@ -132,6 +126,6 @@ def _build(
     )
 
 
-def _first_row(plant: ModalSystem) -> ModalSystem:
-    """The plant with its stroke alone, which filters are designed for."""
-    return replace(plant, C=plant.C[:1])
+def _shared(plant: ModalSystem) -> ModalSystem:
+    """One plant of a batch of one, shared by all trials."""
+    return replace(plant, B=plant.B[..., 0], C=plant.C[..., 0])

@@ -61,7 +61,7 @@ class ExcitationGate(Guard):
 
     def prepare(self, benchmark, controller):
         given = noise_covariance(benchmark, controller) if self.variance is None else self.variance
-        variance = per_part(given, controller.regressor.columns, controller.joint)
+        variance = per_part(given, *controller.sizes)
         return replace(self, variance=variance, pairs=controller.fit.length)
 
     def problems(self, controller):

@@ -36,7 +36,7 @@ class Bounds(Guard):
     shared_axes = MappingProxyType({"low": 2, "high": 2})
 
     def prepare(self, benchmark, controller):
-        sizes = controller.regressor.columns, controller.joint
+        sizes = controller.sizes
         return replace(
             self, low=per_coefficient(self.low, *sizes), high=per_coefficient(self.high, *sizes)
         )
@@ -49,8 +49,8 @@ class Bounds(Guard):
         ]
         if found or low is None or high is None:
             return found
-        ordered = per_coefficient(low, controller.regressor.columns, controller.joint) <= (
-            per_coefficient(high, controller.regressor.columns, controller.joint)
+        ordered = per_coefficient(low, *controller.sizes) <= (
+            per_coefficient(high, *controller.sizes)
         )
         return complaint(ordered, "low", "be at most `high`", f"{low} and {high}")
 
@@ -87,7 +87,7 @@ class RateLimit(Guard):
     shared_axes = MappingProxyType({"most": 2})
 
     def prepare(self, benchmark, controller):
-        sizes = controller.regressor.columns, controller.joint
+        sizes = controller.sizes
         return replace(self, most=per_coefficient(self.most, *sizes))
 
     def problems(self, controller):

@@ -11,7 +11,7 @@ import numpy as np
 
 from martths_jax.algebra import least_squares as ls
 from martths_jax.control.adaptive.arguments import check_shape, known, per_part
-from martths_jax.control.adaptive.base import ACTUATORS, Guard
+from martths_jax.control.adaptive.base import Guard
 
 #: Samples after which the filter has forgotten a single noisy one.
 REMEMBERED = 6000
@@ -38,7 +38,7 @@ class NoiseRemoval(Guard):
     def prepare(self, benchmark, controller):
         given = self.covariance
         given = noise_covariance(benchmark, controller) if given is None else given
-        covariance = per_part(given, controller.regressor.columns, controller.joint)
+        covariance = per_part(given, *controller.sizes)
         return replace(self, covariance=covariance, pairs=controller.fit.length)
 
     def problems(self, controller):
@@ -65,12 +65,13 @@ def noise_covariance(benchmark, controller, *, shared: bool = True) -> np.ndarra
     Returns:
         (parts, n, n) [mm^2].
     """
-    impulses = np.zeros((REMEMBERED, ACTUATORS, ACTUATORS))  # sample, sensor, trial
-    impulses[0] = np.eye(ACTUATORS)
+    n = controller.actuators
+    impulses = np.zeros((REMEMBERED, n, n))  # sample, sensor, trial
+    impulses[0] = np.eye(n)
     phi = np.asarray(
         _responses(controller, jnp.asarray(impulses))
     )  # sample, stroke, regressor, sensor that was hit
-    phi = phi.reshape(REMEMBERED, -1, ACTUATORS)
+    phi = phi.reshape(REMEMBERED, -1, n)
     phi = np.sum(phi, axis=2, keepdims=True) if shared else phi
     whole = benchmark.r_mm2 * np.einsum("kis,kjs->ij", phi, phi)
     n = controller.parts[0].unknowns
@@ -80,9 +81,9 @@ def noise_covariance(benchmark, controller, *, shared: bool = True) -> np.ndarra
 
 @jax.jit
 def _responses(controller, measured):
-    """Regressors (N, strokes, n, T) of measured strokes (N, 2, T) at rest and without commands."""
+    """Regressors (N, m, n, T) of m measured strokes (N, m, T) at rest and without commands."""
     trials = measured.shape[-1]
-    still = jnp.zeros((ACTUATORS, trials))
+    still = jnp.zeros(measured.shape[1:])
 
     def step(carry, measured):
         predicted, taught = carry

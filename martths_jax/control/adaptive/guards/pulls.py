@@ -65,7 +65,7 @@ class ShapedPull(Guard):
     shared_axes = MappingProxyType({"weight": 3, "anchor": 2})
 
     def prepare(self, benchmark, controller):
-        weight = per_part(self.weight, controller.regressor.columns, controller.joint)
+        weight = per_part(self.weight, *controller.sizes)
         return replace(self, weight=weight, anchor=_anchor(self.anchor, controller))
 
     def problems(self, controller):
@@ -104,4 +104,4 @@ class PullToLast(Guard):
 
 def _anchor(given, controller) -> jax.Array:
     anchor = controller.start if given is None else given
-    return per_coefficient(anchor, controller.regressor.columns, controller.joint)
+    return per_coefficient(anchor, *controller.sizes)
