@@ -22,7 +22,6 @@ from martths_jax.files import safe_name
 from martths_jax.sensitivity.estimators import LEVEL
 from martths_jax.sensitivity.results import Sensitivity, indices_of
 
-
 #: Shares are drawn up to here, at most; an interval of few samples may end anywhere.
 WIDEST = 10.0
 
