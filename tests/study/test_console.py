@@ -18,7 +18,6 @@ from martths_jax.cli.console import accept_any_text, console
 from martths_jax.indices import choose
 from martths_jax.motions import MotionInfo
 from martths_jax.published import MARTHS
-from martths_jax.published import MARTHS
 from martths_jax.screen import ScreenTable
 from martths_jax.study.runner import write_results
 from martths_jax.study.summary import Table, summarise
