@@ -59,11 +59,11 @@ class SensorNoise:
         return self.noise_power * fs
 
     def variances(self, fs: float):
-        """``variance``; with load cells (channels, 1), theirs [N^2] after it."""
+        """``variance``; with load cells (1, channels, 1), theirs [N^2] after it."""
         if not self.load_cells:
             return self.variance(fs)
         strokes = [self.variance(fs)] * (self.channels - self.load_cells)
-        return np.array([*strokes, *[self.force_power * fs] * self.load_cells])[:, None]
+        return np.array([*strokes, *[self.force_power * fs] * self.load_cells])[None, :, None]
 
     def draw(self, trial: jax.Array, samples: int, fs: float) -> jax.Array:
         """Noise of the given trials.
