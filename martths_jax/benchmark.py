@@ -53,6 +53,9 @@ LAYOUT = Layout(
         limit=3.8,
     ),
     paper="Condori Uribe et al. 2023",
+    units=("m", "rad") * 3,
+    force_units=("N", "N m", "N m"),
+    force_labels=("storey force", "moment, node 4", "moment, node 7"),
 )
 #: Valve command that counts as saturated [V].
 VOLT_LIMIT = LAYOUT.valves.limit

@@ -43,6 +43,9 @@ class Layout:
         paper: where the problem, and with it its indices, is defined.
         table: name of the table of its indices, of ``indices.table.TABLES``.
         load_cells: whether the plant gives the specimen's force itself, in rows after the strokes.
+        units: of the outputs; all m if there are none.
+        force_units: of the forces; all N if there are none.
+        force_labels: the forces in words; force and its name if there are none.
     """
 
     actuators: tuple[str, ...]
@@ -54,6 +57,24 @@ class Layout:
     load_cells: bool = False
     paper: str = ""
     table: str = ""
+    units: tuple[str, ...] = ()
+    force_units: tuple[str, ...] = ()
+    force_labels: tuple[str, ...] = ()
+
+    @property
+    def output_units(self) -> tuple[str, ...]:
+        """Unit of each output."""
+        return self.units or ("m",) * len(self.outputs)
+
+    @property
+    def load_units(self) -> tuple[str, ...]:
+        """Unit of each force."""
+        return self.force_units or ("N",) * len(self.forces)
+
+    @property
+    def load_labels(self) -> tuple[str, ...]:
+        """Each force in words."""
+        return self.force_labels or tuple(f"force {name}" for name in self.forces)
 
     @property
     def inputs(self) -> int:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from martths_jax import published
-from martths_jax.benchmark import Benchmark
+from martths_jax.benchmark import LAYOUT, Benchmark
 from martths_jax.control.base import Controller
 from martths_jax.control.registry import find
+from martths_jax.errors import argument_error
 from martths_jax.indices import DEFAULT, Index, choose
 from martths_jax.indices import indices as evaluate
 from martths_jax.motions import Motion
@@ -40,7 +41,7 @@ class Comparison:
         found = []
         for controller, values in self.ours.items():
             for name in values:
-                target = published.printed(name, controller)
+                target = published.MARTHS.printed(name, controller)
                 value = values[name]
                 row = {"controller": controller, "index": name, "martths_jax": value,
                        "published": "", "deviation_percent": ""}  # fmt: skip
@@ -98,7 +99,13 @@ def compare_with_table4(
         noise: sensor noise; the benchmark's if None.
         progress: told how many runs are done.
         indices: what is compared, see ``martths_jax.indices.choose``; the benchmark's 24.
+
+    Raises:
+        InputError: for another problem than the maRTHS benchmark, which the table is of.
     """
+    if benchmark.layout != LAYOUT:
+        got = f"one of {benchmark.layout.paper or 'another problem'}"
+        raise argument_error("benchmark", "be the maRTHS benchmark, which Table 4 is of", got)
     controllers = controllers or [find(n).entry.build(benchmark) for n in published.COMPARED]
     chosen = choose(indices, benchmark.layout)
     each: dict[str, dict[str, dict[str, float]]] = {}

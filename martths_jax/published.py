@@ -6,6 +6,49 @@ Mercan 2025 (means over El Centro, Kobe and Morgan Hill scaled by 0.40, nominal 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Published:
+    """Indices that a paper prints of a problem's nominal plant.
+
+    Attributes:
+        table: what the paper calls them.
+        records: names of the ground motions that they are means over.
+        scale: factor on these records [-].
+        values: controller -> index -> number, in the index's unit.
+        aside: what has a column of its own, which no controller here answers to: title -> index
+            -> number.
+    """
+
+    table: str = ""
+    records: tuple[str, ...] = ()
+    scale: float = 1.0
+    values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    aside: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    def printed(self, index: str, controller: str) -> float | None:
+        """What is printed of an index under a controller; None where nothing is."""
+        return self.values.get(controller, {}).get(index)
+
+    @property
+    def over(self) -> str:
+        """The records in words."""
+        *most, last = self.records
+        return f"{', '.join(most)} and {last}" if most else last
+
+    @property
+    def conditions(self) -> str:
+        """What the numbers are over, to complete "... is"."""
+        many = "records" if len(self.records) > 1 else "record"
+        return f"over the {self.over} {many} at a scale of {self.scale:.2f}"
+
+
+#: Of a problem without printed numbers.
+NOTHING = Published()
+
 #: Mode -> (natural frequency [Hz], effective mass in x [%]).
 TABLE1 = {
     1: (2.2913, 81.05),
@@ -53,17 +96,12 @@ ANYWHERE = ("adfc", "passthrough")
 PAIR = ("adfc", "lqg")
 
 
-#: What the column of ``experiment`` is called.
-EXPERIMENT_TITLE = "experiment (LQG)"
-
-
-def experiment(index: str) -> float | None:
-    """What Table 4 prints of an index in the experiment; None where it prints nothing."""
-    return TABLE4[index][EXPERIMENT] if index in TABLE4 else None
-
-
-def printed(index: str, controller: str) -> float | None:
-    """What Table 4 prints of an index under a controller; None where it prints nothing."""
-    if controller not in COLUMNS or index not in TABLE4:
-        return None
-    return TABLE4[index][COLUMNS[controller]]
+_column = lambda i: {index: row[i] for index, row in TABLE4.items()}  # noqa: E731
+#: The maRTHS benchmark's: Calayir, Tao & Mercan 2025.
+MARTHS = Published(
+    table="Table 4",
+    records=("El Centro", "Kobe", "Morgan Hill"),
+    scale=0.40,
+    values={name: _column(i) for name, i in COLUMNS.items()},
+    aside={"experiment (LQG)": _column(EXPERIMENT)},
+)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from martths_jax.campaign.dataset import save_dataset
+from martths_jax.campaign.dataset import FOLDER, save_dataset
 from martths_jax.campaign.files import write_text
 from martths_jax.campaign.store import RunFolder
 from martths_jax.campaign.tables import Summary
@@ -28,6 +28,9 @@ class Results:
 
     dataset: xr.Dataset
     folder: Path
+
+    def __post_init__(self):
+        self.dataset.encoding[FOLDER] = str(self.folder)
 
     @property
     def failed(self) -> int:

@@ -168,6 +168,12 @@ def _usual(settings: dict) -> dict:
     return dict(problem.settings)
 
 
+def with_usual(given: Mapping, defaults: Mapping) -> dict:
+    """Settings over what a campaign has where a study has another default, and over what the
+    problem that is meant has in place of both."""
+    return dict(defaults) | _usual(dict(given)) | dict(given)
+
+
 def unknown_names(names, known, what: str) -> list[str]:
     """Sentences about names that are not among the known ones, each with the nearest."""
     problems = []

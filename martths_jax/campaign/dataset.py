@@ -9,6 +9,7 @@ sessions or on how many devices it was computed: that is in ``provenance.json``.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -23,6 +24,8 @@ from martths_jax.campaign.files import writing
 from martths_jax.campaign.store import FORMAT, RunFolder
 from martths_jax.errors import InputError
 from martths_jax.files import forgiving
+from martths_jax.guests import kept
+from martths_jax.problem import Problem, find_problem
 from martths_jax.watch import Status
 
 INDEX_UNITS = {"units": "see the variable `unit`; delays: positive = late"}
@@ -37,6 +40,10 @@ STATUS_FLAGS = {
 ENCODING = {"_Encoding": "utf-8"}
 #: Longest attribute HDF5 stores in an object's header [bytes].
 LONGEST_ATTRIBUTE = 60_000
+#: Where a dataset's ``encoding`` says what folder it is of.
+FOLDER = "folder"
+#: Problem and case in what identifies a run; they stand near its beginning, before all lists.
+_PROBLEM = re.compile(r'"problem": (?P<name>"[^"]*"), "case": (?P<case>null|\d+)')
 _FIRST_WORDS = {
     "saturated": "valve command beyond its limit",
     "command": "command beyond its range or not a number",
@@ -174,7 +181,7 @@ def attributes(run: RunFolder) -> dict:
     versions = identity["versions"]
     records = "\n".join(f"{n} {identity['motion'][n]['sha256']}" for n in identity["motions"])
     found = {
-        "title": "Virtual multi-axial real-time hybrid simulation: Monte Carlo study",
+        "title": f"{title_of(run.problem)}: Monte Carlo study",
         "Conventions": "CF-1.10",
         "format": FORMAT,
         **{f"version_{name}": text for name, text in versions.items()},
@@ -194,6 +201,11 @@ def attributes(run: RunFolder) -> dict:
     return {k: _shortened(v) if isinstance(v, str) else v for k, v in found.items()}
 
 
+def title_of(problem: Problem) -> str:
+    """A problem in the title of a result file."""
+    return f"Virtual {problem.title.removesuffix(' benchmark')}"
+
+
 def controllers_of(dataset: xr.Dataset) -> dict[str, dict]:
     """Of each controller in a result file: ``kind``, ``label``, ``look`` and ``paper``."""
     try:
@@ -202,6 +214,19 @@ def controllers_of(dataset: xr.Dataset) -> dict[str, dict]:
         told = {}
     blank = lambda name: {"kind": name, "label": name, "look": None, "paper": ""}  # noqa: E731
     return {name: blank(name) | told.get(name, {}) for name in map(str, dataset.controller.values)}
+
+
+def problem_of(dataset: xr.Dataset) -> Problem:
+    """What results are about: the problem that was tested, by default the maRTHS benchmark.
+
+    Args:
+        dataset: of ``Results``, which know the folder that keeps a problem's own files.
+    """
+    found = _PROBLEM.search(str(dataset.attrs.get("identity", "")))
+    if found is None:
+        return find_problem()
+    name = kept(json.loads(found["name"]), Path(dataset.encoding.get(FOLDER, ".")))
+    return find_problem(name, None if found["case"] == "null" else int(found["case"]))
 
 
 def _shortened(text: str) -> str:

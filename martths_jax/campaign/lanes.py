@@ -120,8 +120,10 @@ class Worlds:
         """The benchmark at a sampling rate [Hz] with a coupler of angle [degrees] and arm [m]."""
         key = fs, alpha, arm
         if key not in self._benchmarks:
-            shape = {"alpha_deg": alpha, "arm": arm}
-            coupler = build_coupler(**{k: v for k, v in shape.items() if v is not None})
+            given = {"alpha_deg": alpha, "arm": arm}
+            shape = {k: v for k, v in given.items() if v is not None}
+            # A problem may have a coupler of another kind, or none: its own unless one is moved.
+            coupler = build_coupler(**shape) if shape else None
             self._benchmarks[key] = study_benchmark(replace(self.config, fs=fs), coupler)
         return self._benchmarks[key]
 

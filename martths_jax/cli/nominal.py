@@ -13,6 +13,7 @@ from rich.markup import escape
 from martths_jax import published
 from martths_jax.benchmark import Benchmark, build_benchmark
 from martths_jax.campaign import plan
+from martths_jax.campaign.config import with_usual
 from martths_jax.campaign.formats.mat import save_mat
 from martths_jax.cli.console import console, error_console, progress
 from martths_jax.cli.motion_options import (
@@ -29,14 +30,14 @@ from martths_jax.cli.motion_options import (
 )
 from martths_jax.cli.options import Trial, option, required, setting
 from martths_jax.control.base import Controller
-from martths_jax.errors import argument_error
+from martths_jax.errors import InputError, argument_error
 from martths_jax.files import atomic, safe_name
 from martths_jax.indices import DEFAULT, choose
 from martths_jax.indices import indices as evaluate
 from martths_jax.indices.table import units_in_words
 from martths_jax.motions import available_motions
 from martths_jax.nominal import Comparison, compare_with_table4
-from martths_jax.plant import draw_plants, nominal_plant
+from martths_jax.problem import Problem, find_problem
 from martths_jax.published import COMPARED, PROPOSED
 from martths_jax.screen import ScreenTable
 from martths_jax.sensors import SensorNoise
@@ -50,6 +51,8 @@ REAL = ("elcentro", "kobe", "morganhill")
 BUILT_IN = ("elcentro-like", "kobe-like", "morganhill-like")
 
 Seed = setting("seed")
+Asked = setting("problem", "marths")
+Case = setting("case")
 
 
 def build_controller(given: str, benchmark: Benchmark) -> tuple[Controller, dict]:
@@ -65,8 +68,18 @@ def default_motions(records: Path | None) -> list[str]:
     return list(REAL if there.issuperset(REAL) else BUILT_IN)
 
 
-def modes() -> None:
+def _only_marths(problem: str | None, case: int | None, what: str, instead: str) -> None:
+    """Refuse another problem than the one that a printed table is of."""
+    asked = find_problem(problem or "marths", case)
+    if asked is not find_problem():
+        raise InputError(
+            f"{what} is of the maRTHS benchmark, but got the {asked.title}; {instead}."
+        )
+
+
+def modes(problem: Asked = None, case: Case = None) -> None:
     """Natural modes of the reference structure beside Table 1 of the benchmark."""
+    _only_marths(problem, case, "Table 1", "`martths figures` draws the modes that it has")
     found = natural_modes(build_reference())
     rows = []
     for mode, (f, mass) in published.TABLE1.items():
@@ -86,11 +99,13 @@ def _like(value: float, printed: float) -> str:
 def run(
     motion: required("motions"),
     out: required("out", "a folder"),
-    controller: setting("controllers", PROPOSED) = None,
+    problem: Asked = None,
+    case: Case = None,
+    controller: setting("controllers", f"{', '.join(PROPOSED)}, or the problem's own") = None,
     trial: Trial = 0,
     seed: Seed = 0,
-    fs: setting("fs") = 1024.0,
-    integrator: setting("integrator") = "newmark",
+    fs: setting("fs", "the problem's") = None,
+    integrator: setting("integrator", "the problem's") = None,
     records: Records = None,
     scale: Scale = None,
     pga: Pga = None,
@@ -109,19 +124,25 @@ def run(
     NAME.mat the signals are variables, indices and settings the structs indices and about.  A trial
     that diverges has no indices: its files are written all the same, and the exit code is 1.
     """
-    motions = load_all(motion, records, scale, pga, sa, units, resample, fs, dt, variable)
-    benchmark = build_benchmark(fs, integrator)
-    plants = nominal_plant() if trial == 0 else draw_plants(1, seed, first=trial)
-    drives = [build_controller(given, benchmark) for given in controller or PROPOSED]
-    evaluated = choose(indices or DEFAULT)
+    asked = {"problem": problem, "case": case, "fs": fs, "integrator": integrator, "seed": seed,
+             "controllers": controller}  # fmt: skip
+    given = {name: value for name, value in asked.items() if value is not None}
+    config = make_config(with_usual(given, {"controllers": PROPOSED}))
+    tested = plan.study_problem(config)
+    motions = load_all(motion, records, scale, pga, sa, units, resample, config.fs, dt, variable)
+    benchmark = plan.study_benchmark(config)
+    chosen = [plan.build_controller(name, config, benchmark) for name in config.controllers]
+    drives = [(one.controller, one.identity) for one in chosen]
+    plants = _plants(tested, trial, seed)
+    noise = tested.noise(config.noise_power, config.noise_shared, seed)
+    evaluated = choose(indices or DEFAULT, tested.layout)
     lost = []
     names = ", ".join(drive.name for drive, _ in drives)
     with progress(f"{names}, trial {trial}", len(motions) * len(drives)) as tell:
-        for done, (one, (drive, chosen)) in enumerate(product(motions, drives), 1):
-            about = {"trial": trial, "seed": seed, "integrator": integrator, "settings": chosen}
-            result = simulate(
-                benchmark, drive, plants, one, SensorNoise(seed=seed), keep=True, indices=evaluated
-            )
+        for done, (one, (drive, settings)) in enumerate(product(motions, drives), 1):
+            about = {"problem": config.problem, "case": case, "trial": trial, "seed": seed,
+                     "integrator": config.integrator, "settings": settings}  # fmt: skip
+            result = simulate(benchmark, drive, plants, one, noise, keep=True, indices=evaluated)
             _save_run(out, one, drive.name, result, about, matlab)
             console.print(str(result), highlight=False)
             _print_indices(result)
@@ -133,6 +154,13 @@ def run(
         for line in lost:
             error_console.print(f"[bold red]Diverged:[/] {escape(line)}.", highlight=False)
         raise typer.Exit(1)
+
+
+def _plants(problem: Problem, trial: int, seed: int):
+    """One plant: the nominal one as trial 0, else a drawn one."""
+    if trial:
+        return problem.draw(1, seed, first=trial)
+    return problem.plants(np.zeros((1, len(problem.parameters))), np.zeros(1, int), 1.0)
 
 
 def _save_run(out: Path, motion, name: str, result, settings: dict, mat: bool) -> None:
@@ -174,7 +202,8 @@ def _for_matlab(value):
 
 def _print_indices(result) -> None:
     rows = [(name, f"{value[0]:.3f}") for name, value in evaluate(result).items()]
-    # Four indices a line.
+    # Four indices a line, the last one filled up.
+    rows += [("", "")] * (-len(rows) % 4)
     lines = [tuple(c for row in rows[i : i + 4] for c in row) for i in range(0, len(rows), 4)]
     told = units_in_words(result.sums.indices)
     title = f"{result.controller}, {result.motion}: {told}"
@@ -192,12 +221,16 @@ def table4(
     variable: Variable = None,
     controller: setting("controllers", COMPARED) = None,
     indices: setting("indices", "benchmark") = None,
+    problem: Asked = None,
+    case: Case = None,
 ) -> None:
     """The numbers of Table 4 (24 indices, nominal plant) beside those in print.
 
     Uses El Centro, Kobe and Morgan Hill from --records (or $MARTHS_RECORDS), and the built-in
     motions that behave like them where those are not found.
     """
+    _only_marths(problem, case, "Table 4",
+                 "`martths study` sets what is printed of it beside its nominal plant")  # fmt: skip
     names = motion or default_motions(records)
     if not names:
         raise argument_error("--motion", "name at least one motion", "none")

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from martths_jax.benchmark import VOLT_LIMIT
-from martths_jax.campaign.config import as_settings, make_config
+from martths_jax.campaign.config import as_settings, make_config, with_usual
 from martths_jax.campaign.draws import make_draws
 from martths_jax.campaign.plan import study_benchmark, study_motion, study_problem
 from martths_jax.campaign.provenance import command_line
@@ -17,9 +16,8 @@ from martths_jax.cli.console import console, error_console
 from martths_jax.cli.options import DRAWN, STUDY, one_of, option, takes
 from martths_jax.cli.run_options import Config, Fresh, Quiet, kept, set_devices, settings_of
 from martths_jax.errors import InputError
-from martths_jax.published import COMPARED
+from martths_jax.published import COMPARED, Published
 from martths_jax.screen import ScreenTable
-from martths_jax.sensors import SensorNoise
 from martths_jax.text import counted
 from martths_jax.tune import Options
 from martths_jax.tune import tune as run_tuning
@@ -68,7 +66,12 @@ def tune(
         default="all",
         help="Numbers that are tuned; repeated or with commas",
     ) = None,
-    volts: option(float, "--volts", help="Valve command where the penalty starts [V]") = VOLT_LIMIT,
+    volts: option(
+        float | None,
+        "--volts",
+        default="the limit of the problem's valves",
+        help="Valve command where the penalty starts [V]",
+    ) = None,
     penalty: option(float, "--penalty", help="Weight of the squared excess [1/V^2]") = 10.0,
     mode: option(
         str | None,
@@ -80,14 +83,15 @@ def tune(
     quiet: Quiet = False,
 ) -> None:
     """Tune the numbers of a controller on a set of plants and motions, by gradients."""
-    study = make_config(DEFAULTS | settings_of(config, settings))
+    study = make_config(with_usual(settings_of(config, settings), DEFAULTS))
+    problem = study_problem(study)
     name = one_of("--controller", study.controllers)
     table = dict(study.controller.get(name, {}))
     options = Options(
         name, objective, study.trials, study.seed, _starts(start), tuple(free or ()), steps, rate,
         patience, volts, penalty, method, mode, tuple(table.items()),
     )  # fmt: skip
-    _, controller = options.check()
+    _, controller = options.check(problem.layout)
     motions = study.motions or DEFAULTS["motions"]
     if check in motions:
         raise InputError(
@@ -102,22 +106,24 @@ def tune(
         for text in (text for motion in (*tuned_on, unseen) for text in motion.notices):
             _notice(text)
     benchmark = study_benchmark(study)
-    draws = make_draws(study, study_problem(study))
+    draws = make_draws(study, problem)
     options = replace(options, trials=draws.trials)
-    noise = SensorNoise(study.noise_power, study.noise_shared, study.seed)
+    noise = problem.noise(study.noise_power, study.noise_shared, study.seed)
     out = Path(study.out)
     with kept(out):
         state = run_tuning(
             benchmark, options, tuned_on, out, plants=draws.plants(np.arange(1, draws.trials + 1)),
-            noise=noise, fresh=fresh, tell=(lambda row: None) if quiet else _tell, notice=_notice,
+            noise=noise, problem=problem, fresh=fresh,
+            tell=(lambda row: None) if quiet else _tell, notice=_notice,
             command_line=command_line(),
         )  # fmt: skip
     write_config(as_settings(replace(study, trials=draws.trials)), out / "config.toml",
                  f"A tuning: `martths tune --config FILE --objective {objective}`.")  # fmt: skip
-    rows = write_report(benchmark, controller, state, unseen, check_trials, out, noise)
+    rows = write_report(benchmark, controller, state, unseen, check_trials, out, noise, problem)
     if quiet:
         return
-    console.print(_table(rows, controller.name, unseen.name, check_trials))
+    told = _table(rows, controller.name, unseen.name, check_trials, problem.published)
+    console.print(told)
     console.print(f"{state['ended'] or 'All steps done'}; results in {out}", soft_wrap=True)
 
 
@@ -146,11 +152,17 @@ def _notice(text: str) -> None:
     error_console.print(text, highlight=False, markup=False, soft_wrap=True)
 
 
-def _table(rows: list[dict], controller: str, motion: str, plants: int) -> ScreenTable:
-    heads = ("index", "start", "tuned", "published (nominal, mean of three records)")
+def _table(
+    rows: list[dict], controller: str, motion: str, plants: int, paper: Published
+) -> ScreenTable:
+    heads = ["index", "start", "tuned"]
+    known = any(row["published"] != "" for row in rows)
+    if known:
+        heads.append(f"{paper.table} (nominal, over {paper.over})")
     cells = []
     for row in rows:
-        published = f"{row['published']:.2f}" if row["published"] != "" else "–"
-        cells.append((row["index"], f"{row['start']:.2f}", f"{row['tuned']:.2f}", published))
+        printed = f"{row['published']:.2f}" if row["published"] != "" else "–"
+        cell = (row["index"], f"{row['start']:.2f}", f"{row['tuned']:.2f}", printed)
+        cells.append(cell[: len(heads)])
     title = f"{controller} on {motion}, medians of {counted(plants, 'fresh plant')}"
-    return ScreenTable(title, heads, cells)
+    return ScreenTable(title, tuple(heads), cells)

@@ -13,7 +13,15 @@ from functools import partial
 from pathlib import Path
 
 from martths_jax.errors import InputError
-from martths_jax.figures import histories, paired, plants, spread, structure, synchronisation
+from martths_jax.figures import (
+    histories,
+    paired,
+    plants,
+    spread,
+    storeys,
+    structure,
+    synchronisation,
+)
 from martths_jax.figures.source import ZOOM, Source, open_source
 from martths_jax.figures.style import Drawing, house_style, save
 from martths_jax.files import safe_name
@@ -23,11 +31,15 @@ from martths_jax.study.summary import pairs
 __all__ = ["Drawing", "Source", "draw_figures", "drawings", "figure_list", "open_source"]
 
 
+#: Pictures of the structure, by the name of the problem.
+FRAMES = {"marths": structure.frame, "uniaxial": storeys.frame}
+
+
 def figure_list(source: Source) -> dict[str, Callable[[], Drawing]]:
     """What can be drawn from a study: file name -> function that draws it.
 
-    Figures of the paper carry its numbers; what needs a controller the study has not run is left
-    out.
+    Figures of the maRTHS paper carry its numbers; what needs a controller that the study has not
+    run is left out, and a picture of the structure where nobody has drawn one.
     """
     found: dict[str, Callable[[], Drawing]] = {}
     numbers = {name: 8 + i for i, name in enumerate(ZOOM)}
@@ -55,7 +67,8 @@ def figure_list(source: Source) -> dict[str, Callable[[], Drawing]]:
     found["bode"] = partial(plants.bode, source)
     if signals:
         found["delay"] = partial(plants.delay, source)
-    found["frame"] = partial(structure.frame, source)
+    if source.problem.name in FRAMES:
+        found["frame"] = partial(FRAMES[source.problem.name], source)
     return found
 
 

@@ -12,20 +12,22 @@ from martths_jax.figures.style import (
     line,
     motion_label,
     new_figure,
+    typeset,
 )
 
 
 def strokes(source: Source, motion: str) -> Drawing:
-    """Target and measured strokes of both actuators: the whole record, then three windows."""
+    """Target and measured strokes of all actuators: the whole record, then three windows."""
     time = source.shared(motion).time.values
     runs = {c: source.history(c, motion) for c in source.controllers}
     windows = source.zoom_windows(motion)
-    figure = new_figure(DOUBLE, 158)
-    grid = figure.add_gridspec(4, 3, height_ratios=[1, 1.15, 1, 1.15])
-    for actuator in (0, 1):
+    actuators = source.layout.actuators
+    figure = new_figure(DOUBLE, 79 * len(actuators))
+    grid = figure.add_gridspec(2 * len(actuators), 3, height_ratios=[1, 1.15] * len(actuators))
+    for actuator, called in enumerate(actuators):
         whole = figure.add_subplot(grid[2 * actuator, :])
         _strokes(whole, source, time, runs, actuator, (time[0], time[-1]), widths=(1.4, 0.6))
-        whole.set(xlabel="time [s]", ylabel=f"actuator {actuator + 1}:\nstroke [mm]")
+        whole.set(xlabel="time [s]", ylabel=f"actuator {called}:\nstroke [mm]")
         for a, b in windows:
             whole.axvspan(a, b, color="0.9", zorder=0)
         if actuator == 0:
@@ -35,14 +37,14 @@ def strokes(source: Source, motion: str) -> Drawing:
             axis = figure.add_subplot(grid[2 * actuator + 1, i])
             _strokes(axis, source, time, runs, actuator, window, widths=(2.2, 0.9))
             if i == 0:
-                axis.set_ylabel(f"actuator {actuator + 1}:\nstroke [mm]")
+                axis.set_ylabel(f"actuator {called}:\nstroke [mm]")
             axis.set_xlabel("time [s]")
     data = {"time_s": time}
-    for actuator in (0, 1):
+    for actuator, called in enumerate(actuators):
         # The target answers the motion that was reached, so every controller has its own.
         for name, run in runs.items():
-            data[f"target_{actuator + 1}_{name}_mm"] = run["x_a"][:, actuator]
-            data[f"measured_{actuator + 1}_{name}_mm"] = run["x_m"][:, actuator]
+            data[f"target_{called}_{name}_mm"] = run["x_a"][:, actuator]
+            data[f"measured_{called}_{name}_mm"] = run["x_m"][:, actuator]
     caption = (
         f"Target and measured strokes under {motion_label(motion)}, {source.who}; whole record and "
         "the three shaded windows. The target drawn is that of "
@@ -70,33 +72,33 @@ def _strokes(axis, source, time, runs, actuator, window, widths) -> None:
 
 
 def coefficients(source: Source, controller: str) -> Drawing:
-    """The eight identified coefficients of both actuators over time.
+    """The identified coefficients of all actuators over time, four a target stroke.
 
     The simulation works with scaled derivatives dt^j x^(j); drawn are the coefficients of the
     derivatives themselves, with milliseconds as the unit of time.
     """
-    motion = source.motion
+    motion, actuators = source.motion, source.layout.actuators
     time = source.shared(motion).time.values
-    history = source.coefficients(controller, motion)  # (N, 8, 2)
+    history = source.coefficients(controller, motion)  # (N, 4 n, n)
     step = 1e3 / source.fs  # ms
     units = ("1", "ms", "ms²", "ms³")
     figure = new_figure(DOUBLE, 130)
-    axes = figure.subplots(4, 2, sharex=True)
+    axes = figure.subplots(4, len(actuators), sharex=True, squeeze=False)
     data = {"time_s": time}
-    for stroke in (0, 1):
+    for stroke, moved in enumerate(actuators):
         for order in range(4):
             axis = axes[order, stroke]
-            for actuator in (0, 1):
+            for actuator, called in enumerate(actuators):
                 value = history[:, 4 * stroke + order, actuator] * step**order
-                axis.plot(time, value, **line(1 - actuator), lw=0.8,
-                          label=f"command of actuator {actuator + 1}")  # fmt: skip
-                data[f"a{actuator + 1}_x{stroke + 1}_d{order}_ms{order}"] = value
-            axis.set_ylabel(f"{_derivative(stroke, order)}\n[{units[order]}]")
+                axis.plot(time, value, **line((1, 0)[actuator] if actuator < 2 else actuator),
+                          lw=0.8, label=f"command of actuator {called}")  # fmt: skip
+                data[f"a{called}_x{moved}_d{order}_ms{order}"] = value
+            axis.set_ylabel(f"{_derivative(moved, order)}\n[{units[order]}]")
             _robust_limits(axis, history[:, 4 * stroke + order] * step**order)
             axis.set_xlim(time[0], time[-1])
         axes[-1, stroke].set_xlabel("time [s]")
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     figure.align_ylabels()
     caption = (
         f"Identified coefficients of {source.label(controller)} under {motion_label(motion)}, "
@@ -105,9 +107,9 @@ def coefficients(source: Source, controller: str) -> Drawing:
     return Drawing(figure, data, caption)
 
 
-def _derivative(stroke: int, order: int) -> str:
+def _derivative(stroke: str, order: int) -> str:
     dots = ("{}", r"\dot{{{}}}", r"\ddot{{{}}}", r"\dddot{{{}}}")[order].format("x")
-    return f"of ${dots}_{{a,{stroke + 1}}}$"
+    return f"of ${dots}_{{a,{typeset(stroke)}}}$"
 
 
 def _robust_limits(axis, values: np.ndarray) -> None:

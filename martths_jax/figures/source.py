@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from martths_jax.campaign.dataset import index_names, unit_of, units
+from martths_jax.campaign.dataset import index_names, problem_of, unit_of, units
 from martths_jax.errors import InputError
 from martths_jax.figures.style import Names
+from martths_jax.layout import Layout
+from martths_jax.problem import Problem
 from martths_jax.study import Study, open_study
 
 #: Axes of a signal that holds the coefficients of a command.
@@ -37,6 +40,23 @@ class Source:
     trial: int
     motion: str
     _read: dict = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def problem(self) -> Problem:
+        """What was tested."""
+        return problem_of(self.study.dataset)
+
+    @property
+    def layout(self) -> Layout:
+        """Names and sizes of the problem."""
+        return self.problem.layout
+
+    def plants(self, nominal: bool = False):
+        """The uncertain plants of the study, or the nominal one."""
+        data = self.study.dataset
+        chosen = slice(0, 1) if nominal else slice(1, None)
+        spread = float(json.loads(data.attrs["identity"])["spread"])
+        return self.problem.plants(data.draw.values[chosen], data.trial.values[chosen], spread)
 
     @property
     def controllers(self) -> list[str]:
@@ -68,10 +88,12 @@ class Source:
         return unit_of(self.study.dataset, index)
 
     def coefficients(self, controller: str, motion: str) -> np.ndarray | None:
-        """(N, 8, 2) what a controller calls the coefficients of its command; None without."""
+        """(N, 4 n, n) what a controller calls the coefficients of its command, stroke by stroke
+        those of its derivatives; None without."""
+        n = len(self.layout.actuators)
         stored = self.study.signals(motion, controller)
         for name, variable in stored.data_vars.items():
-            if variable.dims[2:] == COEFFICIENTS and variable.shape[2:] == (8, 2):
+            if variable.dims[2:] == COEFFICIENTS and variable.shape[2:] == (4 * n, n):
                 return self.history(controller, motion)[name]
         return None
 

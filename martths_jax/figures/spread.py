@@ -190,10 +190,11 @@ def _panels(source: Source, names, panel, height: float, ylabel: str):
     """Small panels, four in a row, one an index, with a common legend.
 
     Args:
-        height: of a figure of five or six rows [mm]; more make it higher.
+        height: of a figure of four to six rows [mm]; more make it higher, fewer lower.
     """
     rows = -(-len(names) // 4)
-    figure = new_figure(DOUBLE, height * max(1.0, rows / 6))
+    share = max(1.0, rows / 6) if rows > 3 else (rows + 0.8) / 5
+    figure = new_figure(DOUBLE, height * share)
     axes = figure.subplots(rows, 4, squeeze=False)
     for axis, name in zip(axes.flat, names, strict=False):
         panel(axis, name)

@@ -1,4 +1,4 @@
-"""The reference frame with its nodes, interface and actuators, and its first mode shapes."""
+"""The maRTHS reference frame with its nodes, interface and actuators, and its first modes."""
 
 from __future__ import annotations
 

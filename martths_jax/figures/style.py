@@ -19,10 +19,11 @@ import numpy as np
 from martths_jax.campaign.dataset import controllers_of
 from martths_jax.control.controllers import ENTRIES
 from martths_jax.files import atomic
+from martths_jax.indices.base import plain
 from martths_jax.text import csv_cell
 
 MM = 1 / 25.4  # inch per mm
-_NAME = re.compile(r"([A-Z]+|[A-Za-z]+)(\d*)([a-z]*)_(\w+)")
+_NAME = re.compile(r"([A-Z]+|[A-Za-z]+)(\d*)([a-z]*)(?:_(\w+))?")
 #: Widths of one and of two journal columns [mm].
 SINGLE, DOUBLE = 85.0, 174.0
 BLUE, VERMILLION, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
@@ -131,16 +132,23 @@ class Names:
 
 
 def index_label(name: str) -> str:
-    """The name of an index as it is typeset: a capital with a number as its subscript, ``J5_28``;
-    other words upright, ``TI_1``; what follows either in small letters above, ``J2true_1``."""
+    """The name of an index as it is typeset: a capital with a number as its subscript, ``J5_28``
+    or ``J5``; other words upright, ``TI_1``; what follows either in small letters above,
+    ``J2true_1``."""
     match = _NAME.fullmatch(name)
-    if not match:
+    if not match or not (match[2] or match[4]):
         return name
     word, number, more, where = match.groups()
-    below = ",".join(part for part in (number, where.replace("_", ",")) if part)
+    below = ",".join(part for part in (number, (where or "").replace("_", ",")) if part)
     above = rf"^{{\mathrm{{{more}}}}}" if more else ""
     word = word if len(word) == 1 else rf"\mathrm{{{word}}}"
     return f"${word}_{{{below}}}{above}$"
+
+
+def typeset(name: str) -> str:
+    """A name of an actuator within a formula: digits, or upright letters and digits."""
+    word = plain(name)
+    return word if word.isdigit() else rf"\mathrm{{{word}}}"
 
 
 def motion_label(name: str) -> str:

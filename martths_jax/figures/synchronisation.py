@@ -6,6 +6,7 @@ import numpy as np
 
 from martths_jax.figures.source import Source
 from martths_jax.figures.style import (
+    DOUBLE,
     SINGLE,
     Drawing,
     look,
@@ -13,31 +14,51 @@ from martths_jax.figures.style import (
     new_figure,
 )
 
+#: Panels beside one another, at most.
+ACROSS = 4
+#: A degree of freedom as axes show it: unit -> word, factor, unit on the axis.
+_WORDS = {"m": ("translation", 1e3, "mm"), "rad": ("rotation", 1e3, "mrad")}
+
 
 def actuators(source: Source) -> Drawing:
     """Measured against target strokes."""
     pick = lambda run, i: (run["x_a"][:, i], run["x_m"][:, i])  # noqa: E731
+    called = source.layout.actuators
     return _subspace(
-        source, pick, ("actuator 1", "actuator 2"), ("mm", "mm"), "target stroke",
-        "measured stroke", "actuator coordinates")  # fmt: skip
+        source, pick, [f"actuator {name}" for name in called], ["mm"] * len(called),
+        "target stroke", "measured stroke", "actuator coordinates", called)  # fmt: skip
 
 
 def interface(source: Source) -> Drawing:
     """Estimated motion of the interface against the numerical one."""
-    pick = lambda run, i: (1e3 * run["num"][:, i], 1e3 * run["est"][:, i])  # noqa: E731
+    layout = source.layout
+    shown = [_WORDS.get(u, (u, 1.0, u)) for u in layout.output_units[: len(layout.interface)]]
+    factors = [factor for _, factor, _ in shown]
+    pick = lambda run, i: (factors[i] * run["num"][:, i], factors[i] * run["est"][:, i])  # noqa: E731
+    words = [word for word, _, _ in shown]
+    if len(set(words)) < len(words):
+        words = [f"DOF {name}" for name in layout.interface]
+    *most, last = layout.interface
+    dofs = f"DOFs {', '.join(most)} and {last}" if most else f"DOF {last}"
     return _subspace(
-        source, pick, ("translation", "rotation"), ("mm", "mrad"), "numerical",
-        "estimated", "interface coordinates (DOFs 4 and 28)")  # fmt: skip
+        source, pick, words, [unit for _, _, unit in shown], "numerical", "estimated",
+        f"interface coordinates ({dofs})", [str(i + 1) for i in range(len(words))])  # fmt: skip
 
 
-def _subspace(source, pick, names, units, wanted, reached, coordinates) -> Drawing:
+def _subspace(source, pick, names, units, wanted, reached, coordinates, columns) -> Drawing:
+    """A row of panels a controller, a panel a coordinate; `columns` are their names in the data."""
     runs = {c: source.history(c, source.motion) for c in source.controllers}
-    figure = new_figure(SINGLE, 8 + 42 * len(runs))
-    axes = figure.subplots(len(runs), 2, squeeze=False)
+    across = min(len(names), ACROSS)
+    lines = -(-len(names) // across)
+    figure = new_figure(SINGLE if across <= 2 else DOUBLE, 8 + 42 * lines * len(runs))
+    axes = figure.subplots(lines * len(runs), across, squeeze=False)
     data = {"time_s": source.shared(source.motion).time.values}
     for row, (name, run) in enumerate(runs.items()):
-        for i in (0, 1):
-            axis = axes[row, i]
+        panels = axes[lines * row : lines * (row + 1)].ravel()
+        for axis in panels[len(names) :]:
+            axis.set_visible(False)
+        for i, column in enumerate(columns):
+            axis = panels[i]
             x, y = pick(run, i)
             axis.plot(x, y, color=look(source.position(name))["color"], lw=0.4)
             end = 1.08 * max(np.nanmax(np.abs(x)), np.nanmax(np.abs(y)))
@@ -47,8 +68,8 @@ def _subspace(source, pick, names, units, wanted, reached, coordinates) -> Drawi
             axis.set_title(f"{source.label(name)}, {names[i]}")
             axis.set_xlabel(f"{wanted} [{units[i]}]")
             axis.set_ylabel(f"{reached} [{units[i]}]")
-            data[f"{wanted.split()[0]}_{i + 1}_{name}_{units[i]}"] = x
-            data[f"{reached.split()[0]}_{i + 1}_{name}_{units[i]}"] = y
+            data[f"{wanted.split()[0]}_{column}_{name}_{units[i]}"] = x
+            data[f"{reached.split()[0]}_{column}_{name}_{units[i]}"] = y
     caption = (
         f"Synchronisation subspace plots in {coordinates}, {motion_label(source.motion)}, "
         f"{source.who}; dashed: perfect tracking."

@@ -12,6 +12,7 @@ import numpy as np
 
 from martths_jax.guests import FILES, Copy
 from martths_jax.layout import Layout
+from martths_jax.published import NOTHING, Published
 from martths_jax.sensors import SensorNoise
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class Problem:
         stored: name, words and unit of the variable that holds the parameters' values.
         noise: noise(power [mm^2 s], shared, seed) -> ``SensorNoise``.
         settings: of a study, where its usual ones are other than the maRTHS benchmark's.
+        published: what is printed of its nominal plant, for comparison only.
         partitions: ways to part the structure that it offers.
         files: that it was read from, the problem file first; none for those of this package.
         sha256: digest of those files.
@@ -67,6 +69,7 @@ class Problem:
     stored: tuple[str, str, str]
     noise: Callable[[float, bool, int], SensorNoise] = SensorNoise
     settings: Mapping[str, Any] = field(default_factory=dict)
+    published: Published = NOTHING
     partitions: tuple[str, ...] = ("benchmark",)
     files: tuple[Path, ...] = ()
     sha256: str = ""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from martths_jax import published
 from martths_jax.benchmark import LAYOUT, PARTITIONS, build_benchmark
 from martths_jax.plant import PARAMETERS, SIGMA, Plants, check_plants, draw_plants
 from martths_jax.problem.base import Problem, Reading
@@ -34,5 +35,6 @@ MARTHS = Problem(
     check=check_plants,
     readings={"hz": Reading("_hz", _from_hz), "rad/s": Reading("", _from_rad)},
     stored=("plant_hz", "zeros and poles of the plant; frame_pair is the factor on the pair", "Hz"),
+    published=published.MARTHS,
     partitions=PARTITIONS,
 )

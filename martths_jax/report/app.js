@@ -146,13 +146,14 @@
   // All lines of a run; the measured strokes are target plus error.
   function linesOf(run) {
     const own = run.signals.map((s) => decode(s, run.dt));
-    const sums = [1, 2].map((i) => {
-      const target = own.find((l) => l.name === `target ${i}`);
-      const error = own.find((l) => l.name === `error ${i}`);
-      return { ...target, name: `measured ${i}`, values: target.values.map((v, k) => v + error.values[k]) };
+    const sums = own.filter((l) => l.panel === "stroke [mm]").map((target) => {
+      const actuator = target.name.slice("target ".length);
+      const error = own.find((l) => l.name === `error ${actuator}`);
+      return { ...target, name: `measured ${actuator}`, values: target.values.map((v, k) => v + error.values[k]) };
     });
-    const panels = ["stroke [mm]", "error [mm]", "coefficient [–]", "force [kN]", "moment [N m]"];
-    return panels.flatMap((p) => [...own, ...sums].filter((l) => l.panel === p));
+    const first = ["stroke [mm]", "error [mm]", "coefficient [–]"];
+    const panels = [...first, ...own.map((l) => l.panel)];
+    return [...new Set(panels)].flatMap((p) => [...own, ...sums].filter((l) => l.panel === p));
   }
 
   // Points of a line inside [from, to]: all, or the lowest and the highest of equal stretches.

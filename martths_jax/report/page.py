@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from martths_jax.campaign.dataset import problem_of
 from martths_jax.campaign.session import read_provenance
 from martths_jax.figures import drawings, open_source
 from martths_jax.files import atomic
@@ -99,7 +100,8 @@ def compose(study: Study, pictures: str, others: str = "") -> str:
     }
     room = SIZE - sum(len(part.encode()) for part in parts.values())
     fs = float(np.ravel(study.dataset.attrs["fs"])[0])
-    parts["HISTORIES"] = _json(history_payload(kept, fs, max(LEAST, room)))
+    layout = problem_of(study.dataset).layout
+    parts["HISTORIES"] = _json(history_payload(kept, fs, max(LEAST, room), layout))
     pieces = _own("page.html").split("%%")
     return "".join(parts[piece] if i % 2 else piece for i, piece in enumerate(pieces))
 

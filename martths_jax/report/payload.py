@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from martths_jax.campaign.dataset import index_names, unit_of
+from martths_jax.layout import Layout
 from martths_jax.signals import SIGNALS
 from martths_jax.study import Study
 from martths_jax.watch import Status
@@ -23,6 +24,8 @@ RUNS = 12_000
 #: samples kept of the other signals.
 SLOWER = 4
 STEPS = 32767
+#: Forces as the page shows them: unit -> panel, size of its unit.
+FORCES = {"N": ("force [kN]", 1e3), "N m": ("moment [N m]", 1.0)}
 #: What goes with a signal beside its values [bytes].
 HEAD = 150
 
@@ -92,13 +95,14 @@ def _rounded(values: np.ndarray) -> list:
     return [float(f"{x:.6g}") if np.isfinite(x) else None for x in values.tolist()]
 
 
-def history_payload(kept: list[Kept], fs: float, room: int) -> list[dict]:
+def history_payload(kept: list[Kept], fs: float, room: int, layout: Layout) -> list[dict]:
     """Histories of the kept trials, thinned so that all of them fit into `room` bytes.
 
     Args:
         kept: see ``kept_signals``.
         fs: sampling rate [Hz].
         room: for all histories in the file [bytes of base64].
+        layout: of the problem.
 
     Returns:
         one mapping a controller, motion and kept trial: ``dt`` [s], and ``signals`` with ``name``,
@@ -108,7 +112,10 @@ def history_payload(kept: list[Kept], fs: float, room: int) -> list[dict]:
         stored.sizes["time"] * 2 * 4 / 3 * _weight(stored) * stored.sizes["kept"]
         for _, _, stored in kept
     )
-    names = sum((7 + _coefficients(stored)) * HEAD * stored.sizes["kept"] for _, _, stored in kept)
+    plain = 2 * len(layout.actuators) + len(layout.forces)
+    names = sum(
+        (plain + _coefficients(stored)) * HEAD * stored.sizes["kept"] for _, _, stored in kept
+    )
     stride = max(1, int(np.ceil(full / max(room - names, room / 4))))
     return [
         {
@@ -118,7 +125,7 @@ def history_payload(kept: list[Kept], fs: float, room: int) -> list[dict]:
             "role": str(stored.role.values[k]),
             "dt": 1 / fs,
             "samples": int(stored.sizes["time"]),
-            "signals": list(_signals(stored.isel(kept=k), stride)),
+            "signals": list(_signals(stored.isel(kept=k), stride, layout)),
         }
         for controller, motion, stored in kept
         for k in range(stored.sizes["kept"])
@@ -127,7 +134,8 @@ def history_payload(kept: list[Kept], fs: float, room: int) -> list[dict]:
 
 def _weight(stored) -> float:
     """Signals of a trial, in units of one that is not thinned further."""
-    return 2 + 2 + stored["force"].shape[-1] + _coefficients(stored) / SLOWER
+    plain = 2 * stored["x_a"].shape[-1] + stored["force"].shape[-1]
+    return plain + _coefficients(stored) / SLOWER
 
 
 def _own(stored) -> list[str]:
@@ -144,15 +152,17 @@ def _coefficients(stored) -> int:
     return sum(int(np.prod(stored[name].shape[2:])) for name in _own(stored))
 
 
-def _signals(run, stride: int):
+def _signals(run, stride: int, layout: Layout):
     target, measured = run["x_a"].values, run["x_m"].values
     force = run["force"].values
+    called = list(enumerate(layout.actuators))
     fast = [
-        *((f"target {i + 1}", "stroke [mm]", target[:, i]) for i in (0, 1)),
-        *((f"error {i + 1}", "error [mm]", (measured - target)[:, i]) for i in (0, 1)),
-        ("storey force", "force [kN]", force[:, 0] / 1e3),
-        *((f"moment, node {node}", "moment [N m]", force[:, i]) for i, node in ((1, 4), (2, 7))),
+        *((f"target {name}", "stroke [mm]", target[:, i]) for i, name in called),
+        *((f"error {name}", "error [mm]", (measured - target)[:, i]) for i, name in called),
     ]
+    for i, (name, unit) in enumerate(zip(layout.load_labels, layout.load_units, strict=True)):
+        panel, size = FORCES.get(unit, (f"force [{unit}]", 1.0))
+        fast.append((name, panel, force[:, i] / size))
     for name, panel, values in fast:
         yield _encoded(name, panel, values, stride)
     for name in _own(run):

@@ -1,4 +1,4 @@
-"""Table 4 with our columns beside the published ones, and percentiles over the uncertain plants."""
+"""The published table with our columns beside it, and percentiles over the uncertain plants."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from martths_jax import published
-from martths_jax.campaign.dataset import index_names, unit_of
+from martths_jax.campaign.dataset import index_names, problem_of, unit_of
 from martths_jax.campaign.statistics import PERCENTS, percentile
 from martths_jax.errors import argument_error
 from martths_jax.figures.style import Names, index_label, motion_label
@@ -21,7 +20,7 @@ FORMATS = ("md", "tex", "csv")
 
 
 def study_tables(dataset: xr.Dataset) -> list[Table]:
-    """Table 4, then one table of percentiles a motion."""
+    """The published table, then one table of percentiles a motion."""
     motions = [str(m) for m in dataset.motion.values]
     return [nominal_table(dataset), *(distribution_table(dataset, m) for m in motions)]
 
@@ -36,34 +35,35 @@ def nominal_means(dataset: xr.Dataset) -> dict[str, dict[str, float]]:
 
 
 def nominal_table(dataset: xr.Dataset) -> Table:
-    """The paper's Table 4 and our numbers (nominal plant, mean over the motions)."""
+    """The published table and our numbers (nominal plant, mean over the motions)."""
     means = nominal_means(dataset)
-    called = Names(dataset)
-    heads = ["index", published.EXPERIMENT_TITLE]
+    called, paper = Names(dataset), problem_of(dataset).published
+    heads = ["index", *paper.aside]
     for name in means:
-        label = called.label(name)
-        known = name in published.COLUMNS
+        label, known = called.label(name), name in paper.values
         heads += [f"{label}, paper", f"{label}, here", "deviation"] if known else [f"{label}, here"]
     rows = []
     for index in index_names(dataset):
-        cells = [f"{index} [{unit_of(dataset, index)}]", _printed(published.experiment(index))]
+        cells = [f"{index} [{unit_of(dataset, index)}]"]
+        cells += [_printed(column.get(index)) for column in paper.aside.values()]
         for name, found in means.items():
-            value = found[index]
-            if name not in published.COLUMNS:
-                cells.append(number(value))
-                continue
-            paper = published.printed(index, name)
-            off = "–"
-            if paper is not None and not np.isnan(value):
-                off = f"{round(100 * (value / paper - 1)):+d} %"
-            cells += [_printed(paper), number(value), off]
+            own = _beside(paper.printed(index, name), found[index])
+            cells += own if name in paper.values else [own[1]]
         rows.append(tuple(cells))
     motions = ", ".join(motion_label(str(m)) for m in dataset.motion.values)
-    note = (
-        f"Nominal plant, one noise draw, mean over {motions}; the paper's columns are over El "
-        "Centro, Kobe and Morgan Hill scaled by 0.40."
-    )
-    return Table("Table 4: nominal plant", tuple(heads), rows, (note,))
+    title, note = "Nominal plant", f"Nominal plant, one noise draw, mean over {motions}"
+    if paper.aside or set(means) & set(paper.values):
+        title = f"{paper.table}: nominal plant"
+        note += f"; the paper's columns are over {paper.over} scaled by {paper.scale:.2f}"
+    return Table(title, tuple(heads), rows, (f"{note}.",))
+
+
+def _beside(paper: float | None, value: float) -> list[str]:
+    """A published number, ours, and the deviation."""
+    off = "–"
+    if paper is not None and not np.isnan(value):
+        off = f"{round(100 * (value / paper - 1)):+d} %"
+    return [_printed(paper), number(value), off]
 
 
 def _printed(value: float | None) -> str:
@@ -92,10 +92,11 @@ def distribution_table(dataset: xr.Dataset, motion: str) -> Table:
 
 def tidy_rows(dataset: xr.Dataset) -> list[tuple]:
     """(table, motion, controller, index, unit, statistic, value) of every number, all digits."""
-    rows = []
+    rows, published = [], problem_of(dataset).published
+    table = published.table.lower().replace(" ", "") or "nominal"
     for name, found in nominal_means(dataset).items():
         for index in index_names(dataset):
-            head = ("table4", "mean", name, index, unit_of(dataset, index))
+            head = (table, "mean", name, index, unit_of(dataset, index))
             rows.append((*head, "here", found[index]))
             paper = published.printed(index, name)
             if paper is not None:

@@ -22,6 +22,9 @@ from martths_jax.files import safe_name
 from martths_jax.sensitivity.estimators import LEVEL
 from martths_jax.sensitivity.results import Sensitivity, indices_of
 
+#: Shares are drawn up to here, at most; an interval of few samples may end anywhere.
+WIDEST = 10.0
+
 
 def draw_figures(found: Sensitivity, folder: Path, shown: Sequence[str]) -> list[Path]:
     """Draw a tornado chart of each controller: PDF, PNG and the CSV of what is drawn.
@@ -71,7 +74,8 @@ def tornado(found: Sensitivity, controller: str, shown: Sequence[str]) -> Drawin
                            capthick=0.7, ecolor="k")  # fmt: skip
         panel.set_yticks(places, [factors[j] for j in order], fontsize=6)
         ends = (one.first_low[i], one.total_high[i], one.first_high[i])
-        panel.set_xlim(min(0.0, float(ends[0].min())), max(1.0, *(float(e.max()) for e in ends)))
+        low, high = float(ends[0].min()), max(float(e.max()) for e in ends)
+        panel.set_xlim(max(-WIDEST, min(0.0, low)), min(WIDEST, max(1.0, high)))
         panel.grid(axis="y", visible=False)
         for j in order[::-1]:
             cells = (name, factors[j], one.total[i, j], one.total_low[i, j], one.total_high[i, j],

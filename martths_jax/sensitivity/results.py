@@ -15,6 +15,7 @@ from martths_jax.campaign.dataset import (
     outcome_variables,
     places,
     read_results,
+    title_of,
 )
 from martths_jax.campaign.plan import Plan
 from martths_jax.campaign.store import RunFolder
@@ -152,7 +153,7 @@ def assemble(run: RunFolder, design: Design, plan: Plan) -> xr.Dataset:
         "actuator": places(run.problem.layout.actuators),
     }
     about = attributes(run) | {
-        "title": "Virtual multi-axial real-time hybrid simulation: global sensitivity",
+        "title": f"{title_of(run.problem)}: global sensitivity",
         "confidence": f"{LEVEL:g}, percentile bootstrap, {RESAMPLES} resamples of base samples",
         "base_samples": design.samples,
     }
@@ -219,4 +220,8 @@ def leading(found: Sensitivity, controller: str, most: int = 3) -> Table:
 
 
 def _cell(value: float, low: float, high: float) -> str:
-    return "–" if np.isnan(value) else f"{value:.2f} [{low:.2f}, {high:.2f}]"
+    if np.isnan(value):
+        return "–"
+    # Few samples of an index that hardly varies make the ends of an interval as large as can be.
+    value, low, high = (f"{x:.2f}" if abs(x) < 1000 else f"{x:.0e}" for x in (value, low, high))
+    return f"{value} [{low}, {high}]"

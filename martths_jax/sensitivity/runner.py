@@ -9,7 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from martths_jax.campaign.cells import Batch, Block, Campaign
-from martths_jax.campaign.config import StudyConfig, make_config, read_toml, unknown_names
+from martths_jax.campaign.config import (
+    StudyConfig,
+    make_config,
+    read_toml,
+    unknown_names,
+    with_usual,
+)
 from martths_jax.campaign.lanes import LaneEngine
 from martths_jax.campaign.plan import Plan, build_plan, study_problem
 from martths_jax.campaign.progress import Reporter, Tally
@@ -169,7 +175,7 @@ def build(config, shown: Iterable[str], changes: dict) -> tuple[Plan, Design, tu
     if isinstance(config, (str, Path)):
         config = read_toml(Path(config))
     if not isinstance(config, StudyConfig):
-        config = DEFAULTS | dict(config or {})
+        config = with_usual(dict(config or {}) | changes, DEFAULTS)
     study = make_config(config, **changes)
     names = [index.name for index in choose(study.indices, study_problem(study).layout)]
     shown = shown_of(shown, SHOWN, names)

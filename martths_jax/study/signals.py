@@ -23,7 +23,7 @@ from martths_jax.campaign.store import FORMAT
 from martths_jax.control.base import Signal
 from martths_jax.errors import InputError
 from martths_jax.files import safe_name
-from martths_jax.signals import REFERENCE, declared
+from martths_jax.signals import REFERENCE, declared, in_units
 from martths_jax.simulation import FEW
 from martths_jax.watch import Status
 
@@ -120,16 +120,17 @@ def _is_whole(path: Path, label: str, chosen) -> bool:
 
 def _shared(engine: Engine, motion: str) -> xr.Dataset:
     setup = next(s for (_, m), s in engine.setups.items() if m == motion)
-    ground = np.asarray(setup.ground)
+    ground, layout = np.asarray(setup.ground), engine.plan.problem.layout
+    response = in_units(REFERENCE, layout)
     return xr.Dataset(
         {
             "ground": ("time", ground, {"units": "m s-2", "long_name": "ground acceleration"}),
-            "reference": (("time", *REFERENCE.dims), np.asarray(setup.reference), {
-                "units": REFERENCE.unit, "long_name": REFERENCE.label}),
+            "reference": (("time", *response.dims), np.asarray(setup.reference), {
+                "units": response.unit, "long_name": response.label}),
         },
         {
             "time": ("time", np.arange(ground.size) / engine.plan.benchmark.fs, {"units": "s"}),
-            "dof": places(engine.plan.problem.layout.outputs),
+            "dof": places(layout.outputs),
         },
     )  # fmt: skip
 
@@ -153,7 +154,8 @@ def _run(engine: Engine, controller: str, motion: str, roles: dict, device) -> x
         engine.signals(controller, motion, trials[i : i + FEW], device)
         for i in range(0, trials.size, FEW)
     ]
-    variables, told = {}, declared(engine.setup(controller, motion).controller)
+    layout = engine.plan.problem.layout
+    variables, told = {}, declared(engine.setup(controller, motion).controller, layout)
     for name in batches[0]:
         values = np.concatenate([np.asarray(b[name]) for b in batches])
         variables[name] = stored_signal(told.get(name), name, values)

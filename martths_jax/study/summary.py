@@ -6,9 +6,10 @@ import numpy as np
 import xarray as xr
 
 from martths_jax import published
-from martths_jax.campaign.dataset import controllers_of, index_names, unit_of
+from martths_jax.campaign.dataset import controllers_of, index_names, problem_of, unit_of
 from martths_jax.campaign.statistics import LEVEL, PERCENTS, Estimate, compare, percentile
 from martths_jax.campaign.tables import Summary, Table, extent, number
+from martths_jax.problem import find_problem
 from martths_jax.text import counted
 from martths_jax.watch import Status
 
@@ -21,7 +22,9 @@ def summarise(dataset: xr.Dataset) -> Summary:
     for pair in pairs(dataset):
         tables += [_paired(dataset, motion, pair) for motion in dataset.motion.values]
     tables.append(_nominal(dataset))
-    return Summary(f"Study of {extent(dataset)}", tables)
+    problem = problem_of(dataset)
+    of = "" if problem is find_problem() else f": {problem.title}"
+    return Summary(f"Study of {extent(dataset)}{of}", tables)
 
 
 def pairs(dataset: xr.Dataset) -> list[tuple[str, str]]:
@@ -101,17 +104,19 @@ def _paired(dataset, motion: str, pair: tuple[str, str]) -> Table:
 
 def _nominal(dataset) -> Table:
     mean = dataset.value.sel(trial=0).mean("motion", skipna=False)
+    paper = problem_of(dataset).published
+    names = [str(name) for name in dataset.controller.values]
     heads, pick = ["index"], []
-    for controller in map(str, dataset.controller.values):
-        if controller in published.COLUMNS:
-            heads.append(f"{controller}, Table 4")
-            pick.append(lambda name, c=controller: published.printed(name, c))
+    for controller in names:
+        if controller in paper.values:
+            heads.append(f"{controller}, {paper.table}")
+            pick.append(lambda name, c=controller: paper.printed(name, c))
         heads.append(f"{controller}, here")
         pick.append(lambda name, c=controller: float(mean.sel(controller=c, index=name)))
     rows = [(name, *(_or_dash(get(name)) for get in pick)) for name in index_names(dataset)]
-    motions = ", ".join(dataset.motion.values)
-    note = (
-        f"Nominal plant (trial 0, one noise draw), mean over {motions}; Table 4 is over the "
-        "El Centro, Kobe and Morgan Hill records at a scale of 0.40."
-    )
-    return Table("Nominal plant beside Table 4 of the paper", tuple(heads), rows, (note,))
+    title = "Nominal plant"
+    note = f"Nominal plant (trial 0, one noise draw), mean over {', '.join(dataset.motion.values)}"
+    if any(name in paper.values for name in names):
+        title += f" beside {paper.table} of the paper"
+        note += f"; {paper.table} is {paper.conditions}"
+    return Table(title, tuple(heads), rows, (f"{note}.",))

@@ -7,7 +7,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from martths_jax.campaign.config import StudyConfig, make_config, read_toml, unknown_names
+from martths_jax.campaign.config import (
+    StudyConfig,
+    make_config,
+    read_toml,
+    unknown_names,
+    with_usual,
+)
+from martths_jax.campaign.plan import study_problem
 from martths_jax.control.controllers import ENTRIES
 from martths_jax.control.entry import Entry
 from martths_jax.errors import InputError, raise_all
@@ -64,7 +71,7 @@ def make_sweep(
     if isinstance(config, (str, Path)):
         config = read_toml(Path(config))
     if not isinstance(config, StudyConfig):
-        config = DEFAULTS | dict(config or {})
+        config = with_usual(dict(config or {}) | changes, DEFAULTS)
     try:
         study = make_config(config, **changes)
     except InputError as error:
@@ -72,7 +79,7 @@ def make_sweep(
         problems.append(str(error))
     found, bad = make_axes(axes, _entries(study))
     problems += bad
-    names = list(KNOWN) if study is None else [index.name for index in choose(study.indices)]
+    names = list(KNOWN) if study is None else _names(study)
     shown = shown_of(shown, SHOWN, names)
     problems += unknown_names([n for n in shown if n not in names], names, "Index")
     grid = Grid(found, {})
@@ -83,6 +90,11 @@ def make_sweep(
             problems += bad
     raise_all(problems, "The sweep cannot be run")
     return SweepConfig(study, grid, shown)
+
+
+def _names(study: StudyConfig) -> list[str]:
+    """Names of the indices of a study."""
+    return [index.name for index in choose(study.indices, study_problem(study).layout)]
 
 
 def _entries(study: StudyConfig | None) -> list[Entry]:

@@ -17,6 +17,7 @@ from martths_jax.campaign.dataset import (
     outcome_variables,
     places,
     read_results,
+    title_of,
 )
 from martths_jax.campaign.statistics import percentile
 from martths_jax.campaign.store import RunFolder
@@ -157,7 +158,7 @@ def assemble(run: RunFolder, config: SweepConfig) -> xr.Dataset:
         "parameter": np.array(run.problem.parameters),
     }  # fmt: skip
     about = attributes(run) | {
-        "title": "Virtual multi-axial real-time hybrid simulation: sweep",
+        "title": f"{title_of(run.problem)}: sweep",
         "axes": json.dumps(run.header["identity"]["axes"]),
         "counts": json.dumps(list(identity["counts"])),
     }

@@ -77,10 +77,9 @@ class Gradient:
         if self.mode not in MODES:
             raise argument_error("mode", f"be one of {', '.join(MODES)}", repr(mode))
         self.objective, self.plants = objective, plants
-        fs = benchmark.fs
         trials = len(plants)
         devices = jax.local_devices()[: math.gcd(trials, jax.local_device_count())]
-        observers = objective.observers(fs, benchmark.layout)
+        observers = objective.observers(benchmark.fs)
 
         forward = self.mode == "forward"
 

@@ -19,9 +19,9 @@ from functools import cached_property
 import jax
 import jax.numpy as jnp
 
-from martths_jax.benchmark import LAYOUT, VOLT_LIMIT
+from martths_jax.benchmark import LAYOUT
 from martths_jax.errors import argument_error
-from martths_jax.indices import KNOWN, Index, IndexSums, indices_of, observers_of
+from martths_jax.indices import Index, IndexSums, indices_of, known_of, observers_of
 from martths_jax.layout import Layout
 from martths_jax.observers import Observer
 from martths_jax.watch import Watcher
@@ -33,16 +33,28 @@ class Objective:
 
     Attributes:
         terms: (weight, index name) pairs.
-        volt_limit: valve command above which the penalty starts [V].
+        volt_limit: valve command above which the penalty starts [V]; the valves' own if None.
         penalty: its weight on (peak - volt_limit)^2 summed over the valves [1/V^2].
+        layout: of the problem, which has the indices and the valves.
     """
 
     terms: tuple[tuple[float, str], ...]
-    volt_limit: float = VOLT_LIMIT
+    volt_limit: float | None = None
     penalty: float = 10.0
+    layout: Layout = LAYOUT
+
+    def __post_init__(self):
+        if self.volt_limit is None:
+            object.__setattr__(self, "volt_limit", self.layout.valves.limit)
 
     @classmethod
-    def parse(cls, text: str, volt_limit: float = VOLT_LIMIT, penalty: float = 10.0) -> Objective:
+    def parse(
+        cls,
+        text: str,
+        volt_limit: float | None = None,
+        penalty: float = 10.0,
+        layout: Layout = LAYOUT,
+    ) -> Objective:
         """Objective from a sum such as ``j2 + 0.5*j5 + J8_26``.
 
         A group (``j2``) stands for the mean of its indices.
@@ -50,29 +62,31 @@ class Objective:
         Raises:
             InputError: for an unknown index, a weight or penalty that is not positive, or no term.
         """
-        terms = []
+        terms, known = [], known_of(layout)
+        named = {name.casefold(): name for name in (*known, *(i.group for i in known.values()))}
         for part in text.split("+"):
             match = re.fullmatch(r"\s*(?:([^*\s]+)\s*\*)?\s*([A-Za-z0-9_]+)\s*", part)
-            named = match and match[2].upper()
-            word = (named or "").casefold()
+            word = match[2].casefold() if match else ""
             group = [
-                i.name for i in KNOWN.values() if word in (i.name.casefold(), i.group.casefold())
+                i.name for i in known.values() if word in (i.name.casefold(), i.group.casefold())
             ]
             if not group:
                 raise argument_error(
                     "objective",
                     "be a sum of weighted indices such as j2+0.5*j5",
                     repr(part.strip()),
-                    f"The groups are {', '.join(dict.fromkeys(i.group for i in KNOWN.values()))}; "
-                    f"the indices {', '.join(KNOWN)}.",
+                    f"The groups are {', '.join(dict.fromkeys(i.group for i in known.values()))}; "
+                    f"the indices {', '.join(known)}.",
                 )
-            weight = _positive("objective", match[1] or "1", f"have a positive weight on {named}")
+            wanted = f"have a positive weight on {named[word]}"
+            weight = _positive("objective", match[1] or "1", wanted)
             terms += [(weight / len(group), name) for name in group]
-        limit = _positive("volts", volt_limit, "be a positive limit (V)")
+        limit = layout.valves.limit if volt_limit is None else volt_limit
+        limit = _positive("volts", limit, "be a positive limit (V)")
         weight = float(penalty)
         if not 0 <= weight < float("inf"):
             raise argument_error("penalty", "be zero or positive", penalty)
-        return cls(tuple(terms), limit, weight)
+        return cls(tuple(terms), limit, weight, layout)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -87,16 +101,17 @@ class Objective:
     @property
     def shape(self) -> tuple:
         """What a compiled program of it depends on: everything but the weights."""
-        return self.names, self.volt_limit, self.penalty
+        return self.names, self.volt_limit, self.penalty, self.layout
 
     @cached_property
     def smooth(self) -> tuple[Index, ...]:
         """The indices that count, of kinds that have a useful gradient."""
-        return tuple(replace(KNOWN[name], kind=KNOWN[name].kind.smooth()) for name in self.names)
+        known = known_of(self.layout)
+        return tuple(replace(known[name], kind=known[name].kind.smooth()) for name in self.names)
 
-    def observers(self, fs: float, layout: Layout = LAYOUT) -> tuple[Observer, ...]:
-        """What has to look at a run at a sampling rate [Hz] of a problem."""
-        return (*observers_of(self.smooth, fs), Watcher(layout))
+    def observers(self, fs: float) -> tuple[Observer, ...]:
+        """What has to look at a run at a sampling rate [Hz]."""
+        return (*observers_of(self.smooth, fs), Watcher(self.layout))
 
     def evaluate(
         self, observers: tuple[Observer, ...], states, weights: jax.Array | None = None

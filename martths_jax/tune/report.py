@@ -8,17 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from martths_jax import published
 from martths_jax.benchmark import Benchmark
 from martths_jax.campaign.files import write_text
 from martths_jax.files import atomic
 from martths_jax.indices import indices
 from martths_jax.motions import Motion
-from martths_jax.plant import draw_plants
-from martths_jax.published import TABLE4
+from martths_jax.problem import Problem, find_problem
 from martths_jax.sensors import SensorNoise
 from martths_jax.simulation import simulate
 from martths_jax.tune.parameters import Tuned, tuned
+from martths_jax.tune.search import usual_noise
 
 FRESH = 1_000_001  # first trial number of the fresh plants; tuning starts at 1
 
@@ -31,6 +30,7 @@ def write_report(
     plants: int,
     folder: Path,
     noise: SensorNoise | None = None,
+    problem: Problem | None = None,
 ) -> list[dict]:
     """Write design.json, history.csv, convergence.png and comparison.csv into `folder`.
 
@@ -39,7 +39,8 @@ def write_report(
         state: from ``tune``.
         check: a motion that was not tuned on.
         plants: number of fresh plants.
-        noise: of the sensors; the benchmark's by default.
+        noise: of the sensors; the problem's by default.
+        problem: whose plants they are; the maRTHS benchmark by default.
 
     Returns:
         rows of the comparison: index, medians with the start and the tuned numbers by the true
@@ -52,19 +53,20 @@ def write_report(
     write_text(folder / "design.json", json.dumps(report, indent=1) + "\n")
     _write_csv(folder / "history.csv", state["history"])
     _plot(state["history"], list(map(controller.column, state["start"])), folder)
-    rows = compare(benchmark, controller, state, check, plants, noise)
+    rows = compare(benchmark, controller, state, check, plants, noise, problem)
     _write_csv(folder / "comparison.csv", rows)
     return rows
 
 
 def compare(
-    benchmark, controller: Tuned, state, check: Motion, plants: int, noise=None
+    benchmark, controller: Tuned, state, check: Motion, plants: int, noise=None, problem=None
 ) -> list[dict]:
     """Start against tuned on fresh plants and an unseen motion; see ``write_report``."""
     seed = state["setting"]["seed"]
-    fresh = draw_plants(plants, seed, first=FRESH)
-    noise = noise or SensorNoise(seed=seed)
-    column = published.COLUMNS.get(controller.entry.name)
+    problem = problem or find_problem()
+    fresh = problem.draw(plants, seed, first=FRESH)
+    noise = noise or usual_noise(problem, seed)
+    paper = problem.published.values.get(controller.entry.name, {})
     medians = {}
     for name in ("start", "best"):
         ready = controller.on_host(benchmark, state[name])
@@ -81,7 +83,7 @@ def compare(
             "index": n,
             "start": medians["start"][n],
             "tuned": medians["best"][n],
-            "published": "" if column is None or n not in TABLE4 else TABLE4[n][column],
+            "published": paper.get(n, ""),
         }
         for n in medians["start"]
     ]

@@ -12,7 +12,7 @@ import jax
 import numpy as np
 
 import martths_jax
-from martths_jax.benchmark import VOLT_LIMIT, Benchmark
+from martths_jax.benchmark import LAYOUT, Benchmark
 from martths_jax.campaign.files import set_aside, write_text
 from martths_jax.campaign.header import sealed
 from martths_jax.campaign.machine import machine_identity
@@ -23,8 +23,10 @@ from martths_jax.campaign.session import Session
 from martths_jax.campaign.sources import code_of, engine_code
 from martths_jax.campaign.store import clear
 from martths_jax.errors import InputError, argument_error, raise_all
+from martths_jax.layout import Layout
 from martths_jax.motions import Motion
-from martths_jax.plant import Plants, draw_plants
+from martths_jax.plant import Plants
+from martths_jax.problem import Problem, find_problem
 from martths_jax.runtime import check_runtime
 from martths_jax.sensors import SensorNoise
 from martths_jax.tune.descent import METHODS, Method
@@ -52,7 +54,7 @@ class Options:
         rate: length of the first step, in decades of each number (in units of its start for one
             that may be negative); with Adam, of every step.
         patience: stop after so many steps that improve the best by less than 0.1 %.
-        volts, penalty: see ``Objective``.
+        volts, penalty: see ``Objective``; the limit of the problem's valves by default.
         method: ``lbfgs`` or ``adam``, see ``descent``.
         mode: of differentiation, ``forward`` or ``reverse``; the cheaper one by default.
         settings: of the controller besides those in its text, (name, value) pairs.
@@ -67,22 +69,29 @@ class Options:
     steps: int = 50
     rate: float = 0.1
     patience: int = 15
-    volts: float = VOLT_LIMIT
+    volts: float | None = None
     penalty: float = 10.0
     method: str = "lbfgs"
     mode: str | None = None
     settings: tuple[tuple[str, object], ...] = ()
 
-    def check(self) -> tuple[Objective, Tuned]:
+    def tuned(self) -> Tuned:
+        """The controller with its start."""
+        return tuned(self.controller, dict(self.start), dict(self.settings))
+
+    def check(self, layout: Layout = LAYOUT) -> tuple[Objective, Tuned]:
         """The objective and the controller with its start.
+
+        Args:
+            layout: of the problem that is run.
 
         Raises:
             InputError: naming every option that cannot be used.
         """
         problems, results = [], []
         for make in (
-            lambda: Objective.parse(self.objective, self.volts, self.penalty),
-            lambda: tuned(self.controller, dict(self.start), dict(self.settings)),
+            lambda: Objective.parse(self.objective, self.volts, self.penalty, layout),
+            self.tuned,
         ):
             try:
                 results.append(make())
@@ -116,6 +125,7 @@ def tune(
     *,
     plants: Plants | None = None,
     noise: SensorNoise | None = None,
+    problem: Problem | None = None,
     fresh: bool = False,
     tell: Callable[[dict], None] = lambda row: None,
     notice: Callable[[str], None] = lambda text: None,
@@ -128,7 +138,8 @@ def tune(
         motions: what to tune on.
         folder: where the state is kept; a folder with the state of other options is refused.
         plants: to tune on, in place of ``options.trials`` independent ones.
-        noise: of the sensors; the benchmark's by default.
+        noise: of the sensors; the problem's by default.
+        problem: whose plants and noise they are; the maRTHS benchmark by default.
         fresh: start over, deleting the tuning in the folder.
         tell: called with each row of the history.
         notice: is told what was damaged and set aside.
@@ -145,21 +156,23 @@ def tune(
             folder that holds another tuning or in which one runs.
     """
     check_runtime()
-    objective, controller = options.check()
+    problem = problem or find_problem()
+    objective, controller = options.check(LAYOUT if benchmark is None else benchmark.layout)
     if gradient is None and benchmark is not None:
         controller.check(benchmark)
     with owned(folder, f"tune {options.controller}") as owner:
         if fresh:
             clear(folder, OWN)
         state = _load_or_begin(
-            folder / STATE, options, setting_of(options, motions, benchmark, plants, noise), notice
-        )
+            folder / STATE, controller, options,
+            setting_of(options, motions, benchmark, plants, noise), notice,
+        )  # fmt: skip
         devices = [str(d) for d in jax.local_devices()]
         session = Session(folder, owner, command_line, devices=devices)
         try:
             if gradient is None:
-                plants = draw_plants(options.trials, options.seed) if plants is None else plants
-                noise = noise or SensorNoise(seed=options.seed)
+                plants = plants or problem.draw(options.trials, options.seed)
+                noise = noise or usual_noise(problem, options.seed)
                 free, mode = options.free, options.mode
                 gradient = Gradient(
                     benchmark, controller, objective, plants, motions, noise, free, mode
@@ -176,6 +189,13 @@ def tune(
         finally:
             session.save()
         return state
+
+
+def usual_noise(problem: Problem, seed: int) -> SensorNoise:
+    """The noise of a problem's sensors where nothing else is said."""
+    return problem.noise(
+        problem.settings.get("noise_power", SensorNoise.noise_power), SensorNoise.shared, seed
+    )
 
 
 def setting_of(
@@ -210,19 +230,18 @@ def _digest(tree) -> str:
 
 def _code(options: Options) -> dict | None:
     """What identifies the code of a controller that is not of this package."""
-    _, controller = options.check()
+    controller = options.tuned()
     kind = controller.entry.controller
     if kind.__module__.partition(".")[0] == martths_jax.__name__:
         return None
     return code_of(kind) | {"file": controller.guest.copy.sha256 if controller.guest.copy else ""}
 
 
-def _load_or_begin(path: Path, options: Options, setting: dict, notice) -> dict:
+def _load_or_begin(path: Path, controller: Tuned, options: Options, setting: dict, notice) -> dict:
     """The state in a folder, or that of a tuning that begins."""
     state = _load(path, setting, notice)
     if state is not None:
         return state
-    _, controller = options.check()
     start = controller.coordinates(controller.start)
     method = METHODS[options.method](options.free or tuple(start), options.rate)
     return {"setting": setting, "start": start, "best": start, "descent": method.init(start),

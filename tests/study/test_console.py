@@ -17,6 +17,7 @@ from martths_jax.cli import main, motions, nominal, tune
 from martths_jax.cli.console import accept_any_text, console
 from martths_jax.indices import choose
 from martths_jax.motions import MotionInfo
+from martths_jax.published import MARTHS
 from martths_jax.screen import ScreenTable
 from martths_jax.study.runner import write_results
 from martths_jax.study.summary import Table, summarise
@@ -76,7 +77,7 @@ def tables(tmp_path_factory):
     found["motions"] = motions._table(info)
     rows = [{"index": "J2_1", "start": 1234.567, "tuned": 0.01, "published": 3.9},
             {"index": "diverged [%]", "start": 0.0, "tuned": 100.0, "published": ""}]  # fmt: skip
-    found["tune"] = tune._table(rows, "adfc", "kobe-like", 128)
+    found["tune"] = tune._table(rows, "adfc", "kobe-like", 128, MARTHS)
     heads = ("pull", "noise_power", "spread", "lost [%]", *(f"J{i}_1" for i in range(9)))
     cells = [(f"1e-{i}", "1.5e-07", "1", "0.0", *["-1234. / 5678."] * 9) for i in range(10, 14)]
     found["sweep"] = Table("adfc on one", heads, cells, ("Median.",), keys=3).__rich__()

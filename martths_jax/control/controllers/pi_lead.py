@@ -58,13 +58,17 @@ class LeadAndPI(Controller):
         """x_a(k-1), its lead, error and command, at rest before the first sample."""
         return (jnp.zeros((self.actuators, trials)),) * 4
 
+    @property
+    def _numbers(self) -> list[jax.Array]:
+        return [jnp.asarray(getattr(self, name), float) for name in NUMBERS]
+
     def step(self, state, seen):
         target, led, error, command = state
         c = 2.0 / seen.dt
-        g, z, p = self.lead_gain, self.lead_zero, self.lead_pole
+        # One value a trial stands beside all actuators.
+        P, I, g, z, p = (x[None] if x.ndim else x for x in self._numbers)
         led = (g * ((c + z) * seen.x_a + (z - c) * target) - (p - c) * led) / (c + p)
         late = led - seen.x_m
-        P, I = self.proportional, self.integral
         command = (P + I / c) * late + (I / c - P) * error + command
         return (seen.x_a, led, late, command), Decision(u=command)
 
@@ -76,11 +80,11 @@ ENTRY = Entry(
     paper="Silva et al. 2020, sample controller of the uniaxial benchmark",
     problem="uniaxial",
     parameters=(
-        Parameter("proportional", "P", "proportional gain", 2.0, "1", 0.0, kind="lane"),
-        Parameter("integral", "I", "integral gain", 95.0, "1/s", 0.0, kind="lane"),
-        Parameter("lead_gain", "g", "gain of the lead", 50.8, "1", 0.0, kind="lane"),
-        Parameter("lead_zero", "z", "zero of the lead", 168.6, "1/s", 0.0, kind="lane"),
+        Parameter("proportional", "P", "proportional gain", 2.0, "1", 0.0, kind="tunable"),
+        Parameter("integral", "I", "integral gain", 95.0, "1/s", 0.0, kind="tunable"),
+        Parameter("lead_gain", "g", "gain of the lead", 50.8, "1", 0.0, kind="tunable"),
+        Parameter("lead_zero", "z", "zero of the lead", 168.6, "1/s", 0.0, kind="tunable"),
         Parameter("lead_pole", "p", "pole of the lead", 8570.0, "1/s", 0.0, above=True,
-                  kind="lane"),
+                  kind="tunable"),
     ),
 )  # fmt: skip

@@ -182,13 +182,16 @@ def layout_of(made: FileProblem) -> Layout:
     """Names and sizes of a file's problem."""
     structure = made.structure
     others = tuple(name for name in structure.outputs if name not in structure.interface)
+    outputs = (*structure.interface, *others)
     return Layout(
         actuators=made.rig.actuators,
         interface=structure.interface,
-        outputs=(*structure.interface, *others),
+        outputs=outputs,
         forces=structure.interface,
         valves=made.rig.valves,
         runaway_mm=made.rig.runaway_mm,
+        units=tuple("rad" if turns(dof) else "m" for dof in outputs),
+        force_units=tuple("N m" if turns(dof) else "N" for dof in structure.interface),
     )
 
 

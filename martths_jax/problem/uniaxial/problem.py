@@ -19,6 +19,7 @@ from martths_jax.layout import Layout, Valves
 from martths_jax.problem.base import Problem, Reading
 from martths_jax.problem.uniaxial import structure
 from martths_jax.problem.uniaxial.plant import PACKAGE, Loop, plant_model
+from martths_jax.problem.uniaxial.published import TABLE3
 from martths_jax.rig import plants
 from martths_jax.rig.direct import Direct
 from martths_jax.rig.specimen import LinearSpecimen
@@ -70,6 +71,7 @@ def uniaxial(case: int, loop: Loop = PACKAGE) -> Problem:
         stored=("plant_value", "uncertain parameters of the plant: a3, b1 [1/s], b2 [1/s2], "
                 "k_e [N/m]", "SI"),
         noise=_noise,
+        published=TABLE3[case],
         settings={
             "fs": FS, "integrator": "zoh", "force_from": "measurement", "noise_power": NOISE_MM2,
             "controllers": ("pi-lead",),
