@@ -23,6 +23,8 @@ MODULES = (
     "error_model",
     "adfc_rls",
     "adfc_weighted",
+    "cats_pid",
+    "cats_mpc",
 )
 
 

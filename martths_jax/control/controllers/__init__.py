@@ -8,6 +8,8 @@ from martths_jax.control.controllers import (
     aic,
     ats,
     ats_rls,
+    cats_mpc,
+    cats_pid,
     decoupling,
     derivative_ff,
     error_model,
@@ -28,6 +30,8 @@ from martths_jax.control.controllers.adfc_weighted import WeightedADFC
 from martths_jax.control.controllers.aic import AIC
 from martths_jax.control.controllers.ats import ATS
 from martths_jax.control.controllers.ats_rls import RecursiveATS
+from martths_jax.control.controllers.cats_mpc import CATSMPC
+from martths_jax.control.controllers.cats_pid import CATSPID
 from martths_jax.control.controllers.decoupling import Decoupling
 from martths_jax.control.controllers.derivative_ff import DerivativeFeedforward
 from martths_jax.control.controllers.error_model import ErrorModel
@@ -65,12 +69,16 @@ ENTRIES = (
     error_model.ENTRY,
     adfc_rls.ENTRY,
     adfc_weighted.ENTRY,
+    cats_pid.ENTRY,
+    cats_mpc.ENTRY,
 )
 
 __all__ = [
     "ADFC",
     "AIC",
     "ATS",
+    "CATSMPC",
+    "CATSPID",
     "ENTRIES",
     "LQG",
     "MFF",
