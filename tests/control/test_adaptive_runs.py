@@ -25,6 +25,10 @@ MODULES = (
     "adfc_weighted",
     "cats_pid",
     "cats_mpc",
+    "ekf_tf",
+    "ukf_tf",
+    "ekf_ss",
+    "ukf_ss",
 )
 
 

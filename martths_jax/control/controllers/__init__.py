@@ -12,6 +12,8 @@ from martths_jax.control.controllers import (
     cats_pid,
     decoupling,
     derivative_ff,
+    ekf_ss,
+    ekf_tf,
     error_model,
     inverse,
     lqg,
@@ -23,6 +25,8 @@ from martths_jax.control.controllers import (
     polynomial_darby,
     polynomial_wallace,
     rodeac,
+    ukf_ss,
+    ukf_tf,
 )
 from martths_jax.control.controllers.adfc import ADFC
 from martths_jax.control.controllers.adfc_rls import RecursiveADFC
@@ -34,6 +38,8 @@ from martths_jax.control.controllers.cats_mpc import CATSMPC
 from martths_jax.control.controllers.cats_pid import CATSPID
 from martths_jax.control.controllers.decoupling import Decoupling
 from martths_jax.control.controllers.derivative_ff import DerivativeFeedforward
+from martths_jax.control.controllers.ekf_ss import EKFSS
+from martths_jax.control.controllers.ekf_tf import EKFTF
 from martths_jax.control.controllers.error_model import ErrorModel
 from martths_jax.control.controllers.feedforward import AdaptiveFeedforward
 from martths_jax.control.controllers.frozen import FrozenFeedforward
@@ -47,6 +53,8 @@ from martths_jax.control.controllers.polynomial import Polynomial
 from martths_jax.control.controllers.polynomial_darby import PolynomialDarby
 from martths_jax.control.controllers.polynomial_wallace import PolynomialWallace
 from martths_jax.control.controllers.rodeac import RoDeAC
+from martths_jax.control.controllers.ukf_ss import UKFSS
+from martths_jax.control.controllers.ukf_tf import UKFTF
 
 #: What can be named without a path, in the order of help texts.
 ENTRIES = (
@@ -71,6 +79,10 @@ ENTRIES = (
     adfc_weighted.ENTRY,
     cats_pid.ENTRY,
     cats_mpc.ENTRY,
+    ekf_tf.ENTRY,
+    ukf_tf.ENTRY,
+    ekf_ss.ENTRY,
+    ukf_ss.ENTRY,
 )
 
 __all__ = [
@@ -79,10 +91,14 @@ __all__ = [
     "ATS",
     "CATSMPC",
     "CATSPID",
+    "EKFSS",
+    "EKFTF",
     "ENTRIES",
     "LQG",
     "MFF",
     "MFFLQG",
+    "UKFSS",
+    "UKFTF",
     "AdaptiveFeedforward",
     "Controller",
     "Decision",
