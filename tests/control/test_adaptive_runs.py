@@ -29,6 +29,7 @@ MODULES = (
     "ukf_tf",
     "ekf_ss",
     "ukf_ss",
+    "adfc_akf",
 )
 
 

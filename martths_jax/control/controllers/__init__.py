@@ -3,6 +3,7 @@
 from martths_jax.control.base import Controller, Decision, Observation
 from martths_jax.control.controllers import (
     adfc,
+    adfc_akf,
     adfc_rls,
     adfc_weighted,
     aic,
@@ -29,6 +30,7 @@ from martths_jax.control.controllers import (
     ukf_tf,
 )
 from martths_jax.control.controllers.adfc import ADFC
+from martths_jax.control.controllers.adfc_akf import AdaptiveFilterADFC
 from martths_jax.control.controllers.adfc_rls import RecursiveADFC
 from martths_jax.control.controllers.adfc_weighted import WeightedADFC
 from martths_jax.control.controllers.aic import AIC
@@ -83,6 +85,7 @@ ENTRIES = (
     ukf_tf.ENTRY,
     ekf_ss.ENTRY,
     ukf_ss.ENTRY,
+    adfc_akf.ENTRY,
 )
 
 __all__ = [
@@ -100,6 +103,7 @@ __all__ = [
     "UKFSS",
     "UKFTF",
     "AdaptiveFeedforward",
+    "AdaptiveFilterADFC",
     "Controller",
     "Decision",
     "Decoupling",
