@@ -65,7 +65,8 @@ class AdaptiveFilterADFC(ADFC):
 
     def frozen(self, benchmark, coefficients):
         """Coefficients that stay, behind the filter of the noise that it starts from."""
-        return super(AdaptiveFilterADFC, replace(self, adapt=False)).frozen(benchmark, coefficients)
+        still = replace(self, adapt=False).prepare(benchmark)
+        return still.composed().frozen(benchmark, coefficients)
 
     def step(self, state, seen):
         state, decision = super().step(state, seen)

@@ -7,12 +7,8 @@ from dataclasses import dataclass
 import jax
 
 from martths_jax.control.adaptive.actuator import StateSpace
-from martths_jax.control.controllers.parameter_filter import (
-    ALPHA,
-    PARAMETERS_OF_ALL,
-    Unscented,
-    signals_of,
-)
+from martths_jax.control.controllers.joint_filters import ALPHA, Unscented
+from martths_jax.control.controllers.parameter_filter import PARAMETERS_OF_ALL, signals_of
 from martths_jax.control.entry import Entry
 
 MODEL = StateSpace()

@@ -25,6 +25,8 @@ import numpy as np
 
 from martths_jax.algebra.riccati import dare, solve
 from martths_jax.control.base import Estimator
+from martths_jax.errors import argument_error, as_numbers
+from martths_jax.runtime import check_precision
 from martths_jax.structure.modal import (
     ModalSystem,
     advance,
@@ -106,8 +108,22 @@ def design_adaptive(model: ModalSystem, q, r: float, memory) -> AdaptiveKalmanFi
         q: process noise through the plant's input [mm^2], one for all trials or one a trial (T,);
             may be traced.
         r: r_0, measurement noise that it starts from [mm^2].
-        memory: M [samples], likewise.
+        memory: M [samples], likewise; above 1.
+
+    Raises:
+        InputError: if one of them is out of its range.
     """
+    check_precision()
+    for name, value, least, wanted in (
+        ("q", q, 0.0, "be positive and finite (mm^2)"),
+        ("r", r, 0.0, "be positive and finite (mm^2)"),
+        ("memory", memory, 1.0, "be above 1 (samples)"),
+    ):
+        if isinstance(value, jax.core.Tracer):
+            continue
+        number = as_numbers(value)
+        if not np.all(np.isfinite(number) & (number > least)):
+            raise argument_error(name, wanted, f"{value!r:.80}")
     A, B, C, _ = to_dense(model)
     noises = r * jnp.asarray(FACTORS)
 
