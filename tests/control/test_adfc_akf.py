@@ -1,9 +1,12 @@
 """A filter that finds its noise: on noise that is known; and ADFC behind it."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy import optimize
 
 from martths_jax import ADFC, InputError, draw_plants, simulate
 from martths_jax.control.controllers import AdaptiveFilterADFC, adfc_akf
@@ -80,6 +83,34 @@ def test_its_gains_are_those_of_the_noise_it_found(benchmark):
         np.testing.assert_allclose(gain, expected, atol=(between + 1e-7) * scale)
         noise = estimator.noise({"s": s})[0] / r0
         np.testing.assert_allclose(noise, factor, rtol=0.003 if between else 1e-7)
+
+
+def test_the_equations_solved_anew_each_sample(benchmark):
+    """r as the root of s = tr(C P(r) C') / 2 + r, found by bisection, and its own gain."""
+    A, B, C, _ = to_dense(benchmark.plant_model)
+    x_m = measured(benchmark, 5 * benchmark.r_mm2, 1200, seed=4)[1000:1060, :, :1]
+    estimator = design_adaptive(benchmark.plant_model, Q, benchmark.r_mm2, 8.0)
+    r_hat, x_hat = filtered(estimator, x_m)
+
+    def matched(s, log_r):
+        P = steady_state_gains(A, B, C, Q, np.exp(log_r))[2]
+        return np.log(np.trace(C @ P @ C.T) / 2 + np.exp(log_r)) - np.log(s)
+
+    z, noises, found = np.zeros(len(A)), [], []
+    P = steady_state_gains(A, B, C, Q, benchmark.r_mm2)[2]
+    s = np.trace(C @ P @ C.T) / 2 + benchmark.r_mm2
+    for x in x_m[..., 0]:
+        innovation = x - C @ z
+        s += (innovation @ innovation / 2 - s) / 8
+        bounds = np.log(benchmark.r_mm2) + np.array([-4.6, 4.6])
+        r = np.exp(optimize.brentq(partial(matched, s), *bounds))
+        z = z + steady_state_gains(A, B, C, Q, r)[0] @ innovation
+        noises.append(r)
+        found.append(C @ z)
+        z = A @ z
+    assert max(noises) > 3 * min(noises)
+    np.testing.assert_allclose(r_hat[:, 0], noises, rtol=0.02)
+    np.testing.assert_allclose(x_hat[..., 0], found, atol=0.01 * np.abs(found).max())
 
 
 def test_it_estimates_as_well_as_a_filter_that_knows_the_noise(benchmark):
