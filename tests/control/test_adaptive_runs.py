@@ -23,6 +23,13 @@ MODULES = (
     "error_model",
     "adfc_rls",
     "adfc_weighted",
+    "cats_pid",
+    "cats_mpc",
+    "ekf_tf",
+    "ukf_tf",
+    "ekf_ss",
+    "ukf_ss",
+    "adfc_akf",
 )
 
 

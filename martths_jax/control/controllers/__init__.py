@@ -3,13 +3,18 @@
 from martths_jax.control.base import Controller, Decision, Observation
 from martths_jax.control.controllers import (
     adfc,
+    adfc_akf,
     adfc_rls,
     adfc_weighted,
     aic,
     ats,
     ats_rls,
+    cats_mpc,
+    cats_pid,
     decoupling,
     derivative_ff,
+    ekf_ss,
+    ekf_tf,
     error_model,
     inverse,
     lqg,
@@ -22,15 +27,22 @@ from martths_jax.control.controllers import (
     polynomial_darby,
     polynomial_wallace,
     rodeac,
+    ukf_ss,
+    ukf_tf,
 )
 from martths_jax.control.controllers.adfc import ADFC
+from martths_jax.control.controllers.adfc_akf import AdaptiveFilterADFC
 from martths_jax.control.controllers.adfc_rls import RecursiveADFC
 from martths_jax.control.controllers.adfc_weighted import WeightedADFC
 from martths_jax.control.controllers.aic import AIC
 from martths_jax.control.controllers.ats import ATS
 from martths_jax.control.controllers.ats_rls import RecursiveATS
+from martths_jax.control.controllers.cats_mpc import CATSMPC
+from martths_jax.control.controllers.cats_pid import CATSPID
 from martths_jax.control.controllers.decoupling import Decoupling
 from martths_jax.control.controllers.derivative_ff import DerivativeFeedforward
+from martths_jax.control.controllers.ekf_ss import EKFSS
+from martths_jax.control.controllers.ekf_tf import EKFTF
 from martths_jax.control.controllers.error_model import ErrorModel
 from martths_jax.control.controllers.feedforward import AdaptiveFeedforward
 from martths_jax.control.controllers.frozen import FrozenFeedforward
@@ -45,6 +57,8 @@ from martths_jax.control.controllers.polynomial import Polynomial
 from martths_jax.control.controllers.polynomial_darby import PolynomialDarby
 from martths_jax.control.controllers.polynomial_wallace import PolynomialWallace
 from martths_jax.control.controllers.rodeac import RoDeAC
+from martths_jax.control.controllers.ukf_ss import UKFSS
+from martths_jax.control.controllers.ukf_tf import UKFTF
 
 #: What can be named without a path, in the order of help texts.
 ENTRIES = (
@@ -68,17 +82,31 @@ ENTRIES = (
     adfc_rls.ENTRY,
     adfc_weighted.ENTRY,
     pi_lead.ENTRY,
+    cats_pid.ENTRY,
+    cats_mpc.ENTRY,
+    ekf_tf.ENTRY,
+    ukf_tf.ENTRY,
+    ekf_ss.ENTRY,
+    ukf_ss.ENTRY,
+    adfc_akf.ENTRY,
 )
 
 __all__ = [
     "ADFC",
     "AIC",
     "ATS",
+    "CATSMPC",
+    "CATSPID",
+    "EKFSS",
+    "EKFTF",
     "ENTRIES",
     "LQG",
     "MFF",
     "MFFLQG",
+    "UKFSS",
+    "UKFTF",
     "AdaptiveFeedforward",
+    "AdaptiveFilterADFC",
     "Controller",
     "Decision",
     "Decoupling",

@@ -1,0 +1,33 @@
+"""Inverse of a transfer function that an extended Kalman filter estimates (Ruiz & Song 2024)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+
+from martths_jax.control.adaptive.actuator import TransferFunction
+from martths_jax.control.controllers.joint_filters import Extended
+from martths_jax.control.controllers.parameter_filter import PARAMETERS_OF_ALL, signals_of
+from martths_jax.control.entry import Entry
+
+MODEL = TransferFunction()
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class EKFTF(Extended):
+    """``ParameterFilter`` of x_i = (u_i + c u_j) / (p_2 s^2 + p_1 s + p_0)."""
+
+    name = "ekf-tf"
+    model = MODEL
+    signals = signals_of(MODEL)
+
+
+ENTRY = Entry(
+    name="ekf-tf",
+    controller=EKFTF,
+    label="EKF-TF",
+    paper="after Ruiz & Song 2024, Front. Built Environ. 10:1477804",
+    parameters=(*PARAMETERS_OF_ALL,),
+)
