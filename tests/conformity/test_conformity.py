@@ -148,7 +148,7 @@ def test_the_command_fails_with_a_controller():
     code, text = told(f"{broken.__file__}:Mixing", "--quick")
     assert code == 1
     words = " ".join(text.split())
-    assert "sound: 1 of 14 checks failed (trials)" in words and "FAILED" in words
+    assert "sound: 1 of 15 checks failed (trials)" in words and "FAILED" in words
 
 
 def test_the_command_writes_json():
