@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from martths_jax import Controller, Decision, DirectMeasurement
+from martths_jax import Controller, Decision, DelayLine, DirectMeasurement
 
 
 def controller(kind):
@@ -39,6 +39,24 @@ class Sound(Controller):
 
     def command(self, seen, error):
         return seen.x_a + self.gain * error
+
+
+def halved(state):
+    """Half of a state."""
+    return 0.5 * state
+
+
+@controller
+class Renewed(Sound):
+    """Without a fault, too: a sum of eight errors that is halved after every eight."""
+
+    def delay_line(self, trials):
+        return DelayLine(8, jnp.zeros((2, trials)), halved)
+
+    def step(self, state, seen):
+        error = seen.x_a - seen.x_m
+        state = state + error - seen.delayed
+        return state, Decision(self.command(seen, state), record=error)
 
 
 @controller
