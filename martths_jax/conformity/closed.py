@@ -8,13 +8,16 @@ import numpy as np
 
 from martths_jax.benchmark import VOLT_LIMIT
 from martths_jax.conformity.report import Finding
-from martths_jax.conformity.stand import Stand, same
+from martths_jax.conformity.stand import Stand, apart, same
 from martths_jax.control.base import Controller
 from martths_jax.stability import linear_loop, margin_of, radius_of
 from martths_jax.text import counted
 
 #: Part of the strong motion after which the ground is altered.
 CUT = 0.6
+#: What commands of loop and box may differ by, in parts of the largest: two programs round
+#: differently, and an adaptive fit enlarges that by its condition.
+SAME = 1e-5
 #: Uncertain plants whose stability is told, beside the nominal one.
 WORST = 2
 
@@ -37,6 +40,39 @@ def causal_loop(stand: Stand) -> Finding:
                 "samples ahead",
             )  # fmt: skip
     return Finding(name, True, 0, "No signal depends on later ground motion.", "samples ahead")
+
+
+def as_box(stand: Stand) -> Finding:
+    """The loop's commands, from the box alone on the strokes that the loop recorded."""
+    name, lasting = "loop as box", ~stand.kept.lost[1:]
+    if not lasting.any():
+        return Finding(name, None, None, "No trial lasts through the strong motion.")
+    x_a, x_m, u = (
+        np.moveaxis(stand.kept.signals[signal][1:], 0, -1) for signal in ("x_a", "x_m", "u")
+    )
+    carry, n, difference = None, stand.samples, 0.0
+    for first in range(0, max(len(u) - n, 0) + 1, n):
+        part = slice(first, first + n)
+        given = tuple(_filled(x[part], n) for x in (x_a, x_m))
+        found, carry = stand.drive(stand.controller, given, carry)
+        own, alone = u[part][..., lasting], found[: len(u[part])][..., lasting]
+        difference = max(difference, apart(own, alone))
+    if difference > SAME:
+        return Finding(
+            name, False, difference,
+            f"Commands in the loop differ by {difference:.2g} of the largest from those on its "
+            "recorded x_a and x_m alone; let `step` use nothing of the loop but what `seen` holds.",
+            "of the largest",
+        )  # fmt: skip
+    return Finding(
+        name, True, difference, f"Recorded x_a and x_m alone give the loop's commands to {SAME:g}.",
+        "of the largest",
+    )  # fmt: skip
+
+
+def _filled(x: np.ndarray, length: int) -> np.ndarray:
+    """(N, ...) filled up with zeros to (length, ...)."""
+    return np.pad(x, [(0, length - len(x))] + [(0, 0)] * (x.ndim - 1))
 
 
 def lost(stand: Stand) -> Finding:

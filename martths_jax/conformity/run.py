@@ -61,6 +61,7 @@ CHECKS = (
     Check(("gradient",), slopes.gradient),
     Check(("cost",), _beside),
     Check(("causal loop",), closed.causal_loop, _CAUSAL, True),
+    Check(("loop as box",), closed.as_box, (*_CAUSAL, "nan", "causal loop"), True),
     Check(("lost",), closed.lost, loop=True),
     Check(("volts",), closed.volts, (*_SOUND, "lost"), True),
     Check(("radius", "margin"), closed.stability, loop=True),

@@ -6,6 +6,7 @@ delay line as the loop does, window by window, so that the time it takes is the 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -77,6 +78,14 @@ class Drive:
         carry = self.start(controller, x_a.shape[-1]) if carry is None else carry
         u, carry = self._program(controller, carry, jnp.asarray(x_a), jnp.asarray(x_m))
         return np.asarray(u), carry
+
+    def seconds(self, controller: Controller, strokes: Strokes) -> float:
+        """Time of the program alone, once it is compiled [s]."""
+        carry = self.start(controller, strokes[0].shape[-1])
+        given = jax.block_until_ready((controller, carry, *map(jnp.asarray, strokes)))
+        start = time.perf_counter()
+        jax.block_until_ready(self._program(*given))
+        return time.perf_counter() - start
 
     def _run(self, controller, carry, x_a, x_m):
         self.traces += 1

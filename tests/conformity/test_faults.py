@@ -32,6 +32,7 @@ FAULTS = {
 #: The same for those that the loop has to be run for.
 LOOP_FAULTS = {
     "Foreseeing": (["causal loop"], "Signal u of sample 430 changes .* after sample 430; let `st"),
+    "Clairvoyant": (["loop as box"], "recorded x_a and x_m alone; let `step` use nothing of the"),
     "Loud": (["volts"], r"asks actuator \d in trial \d+ for more than the 3.8 V .*; lower its"),
     "Runaway": (["lost", "radius", "margin"], "Trial 1 diverged: .*; bound what adapts"),
 }
