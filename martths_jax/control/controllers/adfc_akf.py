@@ -43,6 +43,7 @@ class AdaptiveFilterADFC(ADFC):
     adapt: bool = field(default=True, metadata={"static": True})
     r: jax.Array | None = None
 
+    actuators_needed = 2
     name = "adfc-akf"
     signals = (*ADFC.signals, Signal("r_hat", (), "mm^2", "variance of the sensors' noise"))
     shared_axes = MappingProxyType({**ADFC.shared_axes, "memory": 0, "r": 0})

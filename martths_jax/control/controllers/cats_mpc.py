@@ -64,6 +64,7 @@ class CATSMPC(Cascade):
     K_z: jax.Array | None = None
     K_x: jax.Array | None = None
 
+    actuators_needed = 2
     name = "cats-mpc"
     shared_axes = MappingProxyType({"rho": 0, "K_z": 3, "K_x": 2})
 

@@ -52,6 +52,7 @@ class CATSPID(Cascade):
     corner: jax.Array | float = 20.0
     error: str = field(default="measured", metadata={"static": True})
 
+    actuators_needed = 2
     name = "cats-pid"
     shared_axes = MappingProxyType({"k_p": 0, "k_i": 0, "k_d": 0, "corner": 0})
 

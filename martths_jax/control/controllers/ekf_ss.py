@@ -19,6 +19,7 @@ MODEL = StateSpace()
 class EKFSS(Extended):
     """``ParameterFilter`` of x(k+1) = (1 + phi - e) x(k) - phi x(k-1) + g u_i(k) + h u_j(k)."""
 
+    actuators_needed = 2
     name = "ekf-ss"
     model = MODEL
     signals = signals_of(MODEL)

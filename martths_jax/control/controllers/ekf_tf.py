@@ -19,6 +19,7 @@ MODEL = TransferFunction()
 class EKFTF(Extended):
     """``ParameterFilter`` of x_i = (u_i + c u_j) / (p_2 s^2 + p_1 s + p_0)."""
 
+    actuators_needed = 2
     name = "ekf-tf"
     model = MODEL
     signals = signals_of(MODEL)
