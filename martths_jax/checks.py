@@ -10,6 +10,7 @@ import numpy as np
 from martths_jax.benchmark import LAYOUT, Benchmark
 from martths_jax.control.adaptive.inverse import BAND_HZ
 from martths_jax.control.controllers import Controller
+from martths_jax.control.entry import wrong_number
 from martths_jax.errors import InputError, argument_error, raise_all
 from martths_jax.layout import Layout
 from martths_jax.motions import Motion
@@ -208,7 +209,7 @@ def noise_problems(
 def controller_problems(controller, benchmark, trials: int | None) -> list[str]:
     """Sentences about a controller, or a sequence with one a trial, that cannot be used."""
     if isinstance(controller, Controller):
-        return controller.problems(benchmark)
+        return wrong_number(controller, benchmark) or controller.problems(benchmark)
     if isinstance(controller, type) and issubclass(controller, Controller):
         remedy = f"Call it: {controller.__name__}(...)."
         wanted = "be a Controller or a sequence of them"

@@ -90,6 +90,8 @@ EXPERIMENT, LQG, ADFC = range(3)
 COLUMNS = {"lqg": LQG, "adfc": ADFC}
 COMPARED = tuple(COLUMNS)
 PROPOSED = ("adfc",)
+#: What runs on a problem of one's own if nothing is said: the paper's, beside no compensation.
+ANYWHERE = ("adfc", "passthrough")
 #: Who is compared with whom, trial by trial.
 PAIR = ("adfc", "lqg")
 

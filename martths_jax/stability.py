@@ -19,6 +19,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
+from scipy import linalg
 
 from martths_jax.benchmark import Benchmark
 from martths_jax.control.base import Controller
@@ -95,7 +96,13 @@ def spectral_radius(benchmark: Benchmark, controller: Controller, plants: Plants
 
     Arguments as in ``linear_loop``.
     """
-    A = np.asarray(linear_loop(benchmark, controller, plants))
+    return radius_of(linear_loop(benchmark, controller, plants))
+
+
+def radius_of(A) -> np.ndarray:
+    """(T,) largest magnitude of the eigenvalues of (T, n, n) matrices; NaN for those of a matrix
+    that is not finite."""
+    A = np.asarray(A)
     radius = np.full(len(A), np.nan)
     finite = np.isfinite(A).all(axis=(1, 2))
     radius[finite] = np.abs(np.linalg.eigvals(A[finite])).max(axis=1)
@@ -142,24 +149,46 @@ def delay_margin(
     Returns:
         (T,) delay [ms]; 0 where the loop is unstable without any, inf where none is found.
     """
-    stable = spectral_radius(benchmark, controller, plants) < 1
     matrices = linear_loop(benchmark, controller, plants, opened=True)
-    omega = 2 * np.pi * np.geomspace(0.05, 0.5 * benchmark.fs, points)
+    return margin_of(*matrices, benchmark.dt, points=points)
+
+
+def margin_of(A, B, C, dt: float, *, points: int = 4000) -> np.ndarray:
+    """``delay_margin`` of loops that are there: ``linear_loop`` with `opened`.
+
+    Args:
+        A, B, C: (T, n, n), (T, n, 2), (T, 2, n).
+        dt: sample period [s].
+        points: as of ``delay_margin``.
+    """
+    stable = radius_of(A + B @ C) < 1
+    omega = 2 * np.pi * np.geomspace(0.05, 0.5 / dt, points)
     return np.array(
         [
-            _edge(*(np.asarray(m[i]) for m in matrices), omega, benchmark.dt) if good else 0.0
+            _edge(*(np.asarray(m[i]) for m in (A, B, C)), omega, dt) if good else 0.0
             for i, good in enumerate(stable)
         ]
     )
 
 
+def response(A, B, C, z: np.ndarray) -> np.ndarray:
+    """(W, o, i) response C (z I - A)^-1 B at (W,) points z.
+
+    With A = Q S Q^H, S upper triangular (complex Schur form), each point takes a back substitution.
+    Eigenvectors would not do: past samples that are kept are a chain of poles at zero, which has
+    one eigenvector only.
+    """
+    S, Q = linalg.schur(A, output="complex")
+    right = Q.conj().T @ B
+    x = np.zeros((len(z), *right.shape), complex)
+    for i in range(len(S))[::-1]:
+        x[:, i] = (right[i] + S[i, i + 1 :] @ x[:, i + 1 :]) / (z - S[i, i])[:, None]
+    return C @ Q @ x
+
+
 def _edge(A, B, C, omega, dt) -> float:
     """Smallest delay [ms] at which an eigenvalue of the open loop passes through one."""
-    poles, V = np.linalg.eig(A)
-    left, right = C @ V, np.linalg.solve(V, B)
-    z = np.exp(1j * omega * dt)
-    L = (left / (z[:, None, None] - poles)) @ right
-    loci = np.linalg.eigvals(L)
+    loci = np.linalg.eigvals(response(A, B, C, np.exp(1j * omega * dt)))
     # Follow each branch: in the order that makes the step between points smallest.
     orders = np.array(list(permutations(range(loci.shape[1]))))
     for i in range(1, len(loci)):

@@ -11,7 +11,18 @@ import typer
 from rich.markup import escape
 
 from martths_jax import __version__
-from martths_jax.cli import export, figures, motions, nominal, sensitivity, study, sweep, tune
+from martths_jax.cli import (
+    check_controller,
+    export,
+    figures,
+    motions,
+    nominal,
+    problem,
+    sensitivity,
+    study,
+    sweep,
+    tune,
+)
 from martths_jax.cli.console import accept_any_text, error_console
 from martths_jax.errors import InputError
 from martths_jax.runtime import check_devices
@@ -33,10 +44,12 @@ app.command("sweep")(sweep.sweep)
 app.command("sensitivity")(sensitivity.sensitivity)
 app.command("figures")(figures.figures)
 app.command("tune")(tune.tune)
+app.command("check-controller")(check_controller.check_controller)
 app.command("table")(figures.table)
 app.command("report")(figures.report)
 app.command("replay")(figures.replay)
 app.add_typer(motions.app, name="motions")
+app.add_typer(problem.app, name="problem")
 
 
 def _print_version(wanted: bool) -> None:

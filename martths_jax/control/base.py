@@ -155,6 +155,7 @@ class Controller(ABC):
         shared_axes: number of axes of array fields when all trials share them; with one more, the
             last, a field holds one value a trial.  A field that is not named here may too, where
             the controller works with one value a trial and not otherwise.
+        actuators_needed: how many actuators it is made for; None for any number.
     """
 
     name: str = "controller"
@@ -162,6 +163,7 @@ class Controller(ABC):
     adapts: bool = False
     first_lag_range: int = 0
     shared_axes: Mapping[str, int] = MappingProxyType({})
+    actuators_needed: int | None = None
 
     def prepare(self, benchmark: Benchmark) -> Controller:
         """Finish the design for a benchmark (on the host, before the loop).

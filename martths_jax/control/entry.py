@@ -16,6 +16,7 @@ import numpy as np
 
 from martths_jax.control.base import Controller
 from martths_jax.errors import InputError, argument_error
+from martths_jax.text import counted
 
 #: What may become of a parameter: it shapes the program, it may differ from trial to trial, or a
 #: tuning may move it as well.
@@ -236,7 +237,7 @@ class Entry:
             raise argument_error(
                 "settings", f"be among {', '.join(self.defaults) or 'none'}", unknown[0]
             )
-        found = self.problems(settings)
+        found = self.problems(settings) + wrong_number(self.controller, benchmark)
         if found:
             raise InputError("\n".join(found))
         return self._made(benchmark, settings)
@@ -256,6 +257,18 @@ class Entry:
         if self.make is None:
             return self.controller(**settings)
         return self.make(benchmark, **settings)
+
+
+def wrong_number(controller: Controller | type[Controller], benchmark) -> list[str]:
+    """A sentence about a controller that is made for another number of actuators."""
+    needed = controller.actuators_needed
+    got = None if benchmark is None else len(benchmark.layout.actuators)
+    if None in (needed, got) or needed == got:
+        return []
+    return [
+        f"Controller {controller.name!r} is made for {counted(needed, 'actuator')}, but the "
+        f"problem has {got}; adfc, mff, error-model and passthrough take any number."
+    ]
 
 
 def entry_of(controller: type[Controller]) -> Entry:

@@ -22,6 +22,9 @@ from martths_jax.structure.modal import ModalSystem
 
 #: Poles nearer to each other, as a share of the larger one, count as equal.
 NEAR = 1e-6
+#: The same for a nominal plant's, where they are roots of a polynomial: round-off sets two equal
+#: ones apart by its square root, three by its third root.
+NEAR_ROOTS = 1e-4
 HZ = 2 * np.pi  # rad/s per Hz
 
 mixing = jax.numpy_dtype_promotion("standard")  # real and complex poles are combined
@@ -196,21 +199,25 @@ def continuous(groups: Sequence[Sequence[Mode]]) -> ModalSystem:
     return _assembled(groups, 1, lambda p: (p, np.ones_like(p)), np)
 
 
-def first_problem(matrix: Matrix) -> tuple[int, str] | None:
+def first_problem(matrix: Matrix, nominal: bool = False) -> tuple[int, str] | None:
     """The first plant of a batch that has no stable modal form (host).
+
+    Args:
+        nominal: it is the nominal plant.
 
     Returns:
         its row, and what is wrong with which entry and pole; None where all is well.
     """
     for i, row in enumerate(matrix):
         for j, entry in enumerate(row):
-            found = None if entry is None else _problem(entry)
+            near = NEAR_ROOTS if nominal and entry and entry.denominator is not None else NEAR
+            found = None if entry is None else _problem(entry, near)
             if found:
                 return found[0], f"entry ({i + 1}, {j + 1}) {found[1]}"
     return None
 
 
-def _problem(entry: Entry) -> tuple[int, str] | None:
+def _problem(entry: Entry, nearest: float) -> tuple[int, str] | None:
     if entry.degree >= len(entry.poles):
         return 0, (
             f"is improper: its numerator is of degree {entry.degree}, its denominator of degree "
@@ -231,12 +238,13 @@ def _problem(entry: Entry) -> tuple[int, str] | None:
     for k in range(len(poles)):
         for l in range(k):
             larger = np.maximum(np.abs(poles[k]), np.abs(poles[l]))
-            near = np.abs(poles[k] - poles[l]) <= NEAR * larger
+            near = np.abs(poles[k] - poles[l]) <= nearest * larger
             if np.any(near):
                 at = int(np.argmax(near))
                 both = f"{_hertz(poles[l, at])} and {_hertz(poles[k, at])}"
                 return at, f"has nearly equal poles, {both}, and so no modal form"
-    gain = np.asarray(value_at(entry, 0.0)) + 0 * lost
+    with np.errstate(all="ignore"):
+        gain = np.asarray(value_at(entry, 0.0)) + 0 * lost
     if not np.all(np.isfinite(gain)):
         return int(np.argmin(np.isfinite(gain))), "has no finite static gain"
     return None

@@ -84,7 +84,7 @@ def nominal_of(model: PlantModel) -> Nominal:
     values = np.array([model.uncertainty.nominal], dtype=float)
     batch = batch_of(model, values, {}, learns=True, xp=np)
     matrix = model.dynamics.matrix(batch)
-    if problem := first_problem(matrix):
+    if problem := first_problem(matrix, nominal=True):
         raise InputError(f"Plant cannot be used: {problem[1]}, for the nominal parameters.")
     model.dynamics.groups(matrix, batch)
     return Nominal(batch.kept, fastest(matrix))

@@ -195,7 +195,8 @@ class Batch(NamedTuple):
             key: under which the nominal roots are remembered.
         """
         if self.learns:
-            self.kept[key] = nominal_roots([float(c[0]) for c in coefficients])
+            found = self.kept[key] = nominal_roots([float(c[0]) for c in coefficients])
+            return Roots(*(tuple(map(self.full, kind)) for kind in found))
         c = self.xp.stack([self.full(c) for c in coefficients], axis=1)
         return roots(c, self.kept[key])
 

@@ -129,7 +129,13 @@ def nominal(model: PlantModel) -> TransferPlants:
 
 
 def draw(
-    model: PlantModel, n: int, seed: int = 0, *, first: int = 1, spread: float = 1.0
+    model: PlantModel,
+    n: int,
+    seed: int = 0,
+    *,
+    first: int = 1,
+    spread: float = 1.0,
+    around: TransferPlants | None = None,
 ) -> TransferPlants:
     """Draw uncertain plants; trial i depends on (seed, i) alone.
 
@@ -139,6 +145,7 @@ def draw(
         seed: seed of the study, from 0 to 2^63 - 1.
         first: number of the first trial; trial 0 is the nominal plant by convention.
         spread: factor on the standard deviations [-].
+        around: one plant of the model that they scatter about; the nominal one by default.
 
     Returns:
         Trials first ... first + n - 1.
@@ -154,7 +161,12 @@ def draw(
     stream = jax.random.fold_in(jax.random.key(seed), PLANT_STREAM)
     numbers = (len(model.uncertainty),)
     one = jax.vmap(lambda i: jax.random.normal(jax.random.fold_in(stream, i), numbers))
-    return check(TransferPlants(one(trial), trial, model, _checked_spread(spread)))
+    about = None
+    if around is not None:
+        if not isinstance(around, TransferPlants) or around.model != model or len(around) != 1:
+            raise argument_error("around", "be one plant of the same model", repr(around)[:80])
+        about = jnp.broadcast_to(around.values, (n, *numbers))
+    return check(TransferPlants(one(trial), trial, model, _checked_spread(spread), about))
 
 
 def from_draws(model: PlantModel, draws, *, trial=None, spread: float = 1.0) -> TransferPlants:

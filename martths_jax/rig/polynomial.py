@@ -117,7 +117,7 @@ def roots(coefficients, start: Roots, iterations: int = ITERATIONS) -> Roots:
                 before, found = found, _aberth(c, found)
                 if np.allclose(before.stacked(), found.stacked(), rtol=1e-14, atol=0):
                     break
-            return _newton(c, _newton(c, found))
+            return found
     still = [jax.lax.stop_gradient(x) for x in c]
     found = jax.lax.fori_loop(0, iterations, lambda _, s: _aberth(still, s), begin)
     found = jax.tree.map(jax.lax.stop_gradient, found)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.special import ndtri
+from scipy import linalg, special
 
 from martths_jax.errors import argument_error, as_numbers
 
@@ -108,20 +108,43 @@ class Uncertainty:
         ]
         return jnp.stack(columns, axis=1)
 
-    def draws(self, values, spread=1.0) -> np.ndarray:
-        """(T, p) standard normal draws that give parameters (T, p): the inverse of ``values``.
+    def draws(self, values, spread: float = 1.0) -> np.ndarray:
+        """Standard normal draws that give parameters, the inverse of ``values`` (host).
 
-        On the host.  A uniform parameter outside of its range has none, and gives infinity.
+        Args:
+            values: (T, p) or (p,) parameters.
+            spread: factor on all standard deviations [-].
+
+        Returns:
+            (T, p) draws, zero where nothing varies.
+
+        Raises:
+            InputError: for a wrong shape, or a value that no draw gives.
         """
-        values = np.asarray(values, dtype=float).reshape(-1, len(self))
-        columns = [
-            _draw(self.distributions[i], self.kinds[i], m, self.sigmas[i] * spread, values[:, i])
-            for i, m in enumerate(self.nominal)
-        ]
-        z = np.stack(columns, axis=1) if columns else values
+        values = np.atleast_2d(as_numbers(values))
+        if values.ndim != 2 or values.shape[1] != len(self):
+            raise argument_error(
+                "values", f"have shape (trials, {len(self)})", f"shape {values.shape}"
+            )
+        if not self.names:
+            return values
+        columns = []
+        for i, name in enumerate(self.names):
+            one = (self.distributions[i], self.kinds[i], self.nominal[i], self.sigmas[i] * spread)
+            with np.errstate(all="ignore"):
+                z = _draw(*one, values[:, i])
+            if not np.all(np.isfinite(z)):
+                row = int(np.argmin(np.isfinite(z)))
+                raise argument_error(
+                    "values", f"be within the {self.distributions[i]} distribution of {name}",
+                    f"{values[row, i]:g} in row {row}",
+                )  # fmt: skip
+            columns.append(z)
+        z = np.stack(columns, axis=1)
         if self.correlation is None:
             return z
-        return np.linalg.solve(np.linalg.cholesky(np.array(self.correlation)), z.T).T
+        L = np.linalg.cholesky(np.array(self.correlation))
+        return linalg.solve_triangular(L, z.T, lower=True).T
 
     def column(self, values: jax.Array, name: str) -> jax.Array:
         """(T,) values of one parameter out of (T, p).
@@ -145,16 +168,14 @@ def _parameter(distribution: str, kind: str, m, sigma, z):
 
 
 def _draw(distribution: str, kind: str, m: float, sigma: float, x: np.ndarray) -> np.ndarray:
-    """Inverse of ``_parameter``; zero where nothing varies."""
+    """(T,) draws of one parameter, the inverse of ``_parameter``; not finite where none fits."""
     if sigma == 0:
-        return np.zeros_like(x)
+        return np.where(np.isclose(x, m, rtol=1e-12, atol=0), 0.0, np.inf)
     if distribution == "lognormal":
         share = sigma if kind == "relative" else sigma / abs(m)
         return np.log(x / m) / float(_log_sigma(share))
     z = (x / m - 1) / sigma if kind == "relative" else (x - m) / sigma
-    if distribution == "uniform":
-        z = ndtri(0.5 * (1 + z / np.sqrt(3)))
-    return z
+    return np.sqrt(2) * special.erfinv(z / np.sqrt(3)) if distribution == "uniform" else z
 
 
 def _log_sigma(share):

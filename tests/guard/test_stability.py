@@ -24,8 +24,10 @@ from martths_jax.stability import (
     delay_margin,
     linear_loop,
     radius_along,
+    response,
     spectral_radius,
 )
+from tests.conformity.broken import Sound
 
 IMPULSE = Motion("impulse", np.eye(1, 3000)[0] * 1e-2, 1024.0)
 QUIET = SensorNoise(noise_power=0.0)
@@ -109,6 +111,28 @@ def test_without_feedback_of_the_error_no_delay_is_too_long(benchmark):
         assert delay_margin(benchmark, controller, nominal_plant()) == [np.inf]
         A, B, C = (m[0] for m in linear_loop(benchmark, controller, nominal_plant(), opened=True))
         assert all(delayed_radius(A, B, C, d) < 1 for d in (0, 1, 7, 40))
+
+
+def test_the_response_of_a_chain_of_past_samples():
+    """n samples of delay are z^-n, though all n poles share one eigenvector; and a full system."""
+    z = np.exp(1j * np.array([0.01, 0.7, 3.0]))
+    chain = np.eye(5, k=-1)
+    found = response(chain, np.eye(5, 1), np.eye(1, 5, k=4), z)
+    np.testing.assert_allclose(found[:, 0, 0], z**-5.0, rtol=1e-12)
+    rng = np.random.default_rng(3)
+    A, B, C = (rng.standard_normal(shape) for shape in ((6, 6), (6, 2), (3, 6)))
+    direct = [C @ np.linalg.solve(x * np.eye(6) - A, B) for x in z]
+    np.testing.assert_allclose(response(A, B, C, z), direct, rtol=1e-10)
+
+
+def test_a_controller_with_a_memory_has_a_margin(benchmark):
+    """Its past samples make the open loop defective, which eigenvectors cannot be inverted for."""
+    sound = Sound(0.3).prepare(benchmark)
+    samples = delay_margin(benchmark, sound, nominal_plant())[0] * 1.024
+    matrices = [m[0] for m in linear_loop(benchmark, sound, nominal_plant(), opened=True)]
+    assert 50 < samples < 200
+    assert delayed_radius(*matrices, int(np.floor(samples))) < 1
+    assert delayed_radius(*matrices, int(np.ceil(samples))) > 1
 
 
 def delayed_radius(A, B, C, samples: int) -> float:

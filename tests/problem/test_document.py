@@ -1,6 +1,8 @@
 """A problem file's lines, units, getters, and that every fault is found at once."""
 
 import math
+import random
+import tomllib
 
 import pytest
 
@@ -58,19 +60,18 @@ def test_a_key_stands_on_its_line(path):
     assert key_lines(TRICKY)[path] == PLACES[path]
 
 
+def paths(value, path=()):
+    """Paths of all that a document holds."""
+    if path:
+        yield path
+    if isinstance(value, dict | list):
+        for key, inside in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from paths(inside, (*path, key))
+
+
 def test_places_are_those_of_the_values():
     """Every path of the data has a line and no line is without data."""
-    document = Document(TRICKY)
-
-    def paths(value, path=()):
-        if path:
-            yield path
-        if isinstance(value, dict | list):
-            items = value.items() if isinstance(value, dict) else enumerate(value)
-            for key, inside in items:
-                yield from paths(inside, (*path, key))
-
-    assert set(key_lines(TRICKY)) == set(paths(document.root.data))
+    assert set(key_lines(TRICKY)) == set(paths(tomllib.loads(TRICKY)))
 
 
 def faults(text, read=lambda root: None):
@@ -209,3 +210,37 @@ def test_a_file_that_is_none_or_no_toml(tmp_path):
     (tmp_path / "b.toml").write_bytes(b'units = "SI"\r\n[a]\r\nb = 1\r\n')
     document = read_document(tmp_path / "b.toml")
     assert document.line(("a", "b")) == 3 and document.beside("c.npz") == tmp_path / "c.npz"
+
+
+SCALARS = ['"a]b"', "'c # d'", '"""x\n[y]\nz=1"""', "'''q\n\"k\" = 2'''", "1", "true", "inf",
+           "1979-05-27 07:32:00", '"\\"x\\\\"', '""', '""""""', '"""a\\"""b"""']  # fmt: skip
+
+
+def some_value(draw, depth=0):
+    """A scalar, a list over several lines, or an inline table."""
+    kind = draw.random()
+    if depth > 2 or kind < 0.5:
+        return draw.choice(SCALARS)
+    inside = [some_value(draw, depth + 1) for _ in range(draw.randint(0, 3))]
+    if kind < 0.75:
+        return "[\n" + ", # ]\n".join(inside) + "\n]"
+    pairs = [f"k{i}{draw.choice(['', '.z'])} = {v}" for i, v in enumerate(inside)]
+    return "{" + ", ".join(v for v in pairs if "\n" not in v) + "}"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_lines_of_random_texts(seed):
+    """Each key is called by the line that it is written on."""
+    draw = random.Random(seed)
+    text, wanted = "", {}
+    for table in range(8):
+        head = draw.choice([f"[t{table}] # [x]", "[[rows]]", f"[ a.t{table} ]"])
+        count = text.count("[[rows]]")
+        path = {"[[": ("rows", count), "[t": (f"t{table}",)}.get(head[:2], ("a", f"t{table}"))
+        text += f"{head}\n"
+        for key in range(draw.randint(0, 4)):
+            wanted[(*path, f"k{key}")] = text.count("\n") + 1
+            text += f"{draw.choice(['', '  '])}k{key} = {some_value(draw)} # = [\n"
+    data = tomllib.loads(text)
+    lines = key_lines(text)
+    assert {path: lines[path] for path in wanted} == wanted and set(lines) == set(paths(data))

@@ -264,9 +264,24 @@ def test_a_specimen_that_is_more_than_the_reference(tmp_path):
     assert data.notes[-1].startswith(
         "The laboratory part is stiffer than the reference in the motion"
     )
+    np.savez(tmp_path / "part.npz", M=np.array([[1 + 1e-15]]), **part)
+    assert read(text, tmp_path).numerical.M[0, 0] == 0.0, "round-off is no mass"
     np.savez(tmp_path / "part.npz", M=np.array([[1.5]]), **part)
     wanted = "line 8: The laboratory part has more mass than the reference in the motion of a.x: "
     assert wanted in sentence_of(text, tmp_path)
+
+
+def test_sizes_beyond_all_bounds():
+    text = GOOD.replace("A = 4e-3\nI", "A = 1e300\nI")
+    assert "line 25: Member b-d has a stiffness or a mass beyond all bounds" in sentence_of(text)
+    text = GOOD.replace("b = {x = 0, y = 3}", "b = {x = 0, y = 1e200}")
+    assert "Member ab has a stiffness or a mass beyond" in sentence_of(text)
+    text = GOOD.replace("m = 100.0", "m = 1e25")
+    assert "line 28: The natural frequencies cannot be found: stiff" in sentence_of(text)
+    text = GOOD.replace("m = 100.0", "m = 1e-300")
+    assert "line 28: Equations of the structure are singular here: some" in sentence_of(text)
+    text = GOOD.replace("column = {E = 210e9", "column = {E = 1e-20")
+    assert "line 28: The frame is a mechanism" in sentence_of(text)
 
 
 def test_damping_given_twice(tmp_path):

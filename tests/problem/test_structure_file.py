@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from martths_jax.problem.file.structure import load_structure
+from martths_jax.problem.file.problem import read_problem
 from martths_jax.problem.file.template import template, write_template
 from martths_jax.structure.assembly import assemble
 from martths_jax.structure.constraints import rigid_link
@@ -218,10 +218,13 @@ def by_hand():
     c.r) with d.x = b.x."""
     h, L, a = 3.0, 5.0, 0.1
     EI, EA = 210e9 * 3.9e-5, 210e9 * 5.4e-3
+    EI_l = 210e9 * 2e-6  # of the slender column, a to b
     K = np.zeros((6, 6))
-    K[0, 0] = 2 * 12 * EI / h**3
-    K[0, 3] = K[3, 0] = K[0, 4] = K[4, 0] = K[0, 5] = K[5, 0] = 6 * EI / h**2
-    K[3, 3] = K[4, 4] = K[5, 5] = 4 * EI / h
+    K[0, 0] = 12 * (EI + EI_l) / h**3
+    K[0, 3] = K[3, 0] = 6 * EI_l / h**2
+    K[0, 4] = K[4, 0] = K[0, 5] = K[5, 0] = 6 * EI / h**2
+    K[3, 3] = 4 * EI_l / h
+    K[4, 4] = K[5, 5] = 4 * EI / h
     K[4, 5] = K[5, 4] = 2 * EI / h
     K[1, 1] = K[2, 2] = EA / h
     l, EI_b = L - 2 * a, 210e9 * 8.4e-5
@@ -232,21 +235,21 @@ def by_hand():
     turn = np.array([[1 / l, -1 / l, 1 + a / l, a / l], [1 / l, -1 / l, a / l, 1 + a / l]])
     K[np.ix_([1, 2, 3, 4], [1, 2, 3, 4])] += turn.T @ bend @ turn
     carried = (7850 * 5.4e-3 + 8e3 / 9.80665) * L / 2
-    M = np.diag([7500 + 2 * carried, 1500 + carried, 6000 + carried, 40, 0, 0])
+    M = np.diag([7500 + 2 * carried, 1500 + carried, 6000 + carried, 400, 0, 0])
     return M, K
 
 
 def test_the_template_parses_and_is_the_frame_it_describes(tmp_path):
     write_template(tmp_path / "problem.toml")
-    data = load_structure(tmp_path / "problem.toml")
+    data = read_problem(tmp_path / "problem.toml").structure
     M, K = by_hand()
     flexible = np.linalg.inv(K)[:4, :4] @ M[:4, :4]
     omega = 1 / np.sqrt(np.sort(np.linalg.eigvals(flexible).real)[::-1])
     np.testing.assert_allclose(data.reference.frequency, omega / (2 * np.pi), rtol=1e-9)
-    h, EI = 3.0, 210e9 * 3.9e-5
+    h, EI = 3.0, 210e9 * 2e-6
     column = EI * np.array([[12 / h**3, 6 / h**2], [6 / h**2, 4 / h]])
     np.testing.assert_allclose(data.laboratory.K, column, rtol=1e-12)
-    np.testing.assert_allclose(data.laboratory.M, np.diag([1500.0, 40.0]), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(data.laboratory.M, np.zeros((2, 2)), atol=1e-12)
     assert data.interface == ("b.x", "b.rotation")
     assert [m.name for m in data.members if m.laboratory] == ["left column"]
     assert data.members[2].start == (0.0, 3.0) and data.members[2].end == (5.0, 3.0)
@@ -291,6 +294,18 @@ def test_a_rule_of_damping_gives_its_ratios(rule):
     else:
         second, pair = (1, [0.05, 0.05]) if rule == "rayleigh" else (2, [0.02, 0.03])
         np.testing.assert_allclose(ratio[[0, second]], pair, rtol=1e-9)
+
+
+def test_a_caughey_series_leaves_what_has_no_mass_undamped():
+    """With a rotation kept for an actuator, the modes have the ratios that they have without."""
+    free = read(toml_of(two_storeys(), damping=RULES["caughey"])).reference
+    found = with_part("a column", RULES["caughey"]).reference
+    heavy = [i for i, name in enumerate(found.dofs) if not name.endswith(".rotation")]
+    assert len(heavy) == len(found.dofs) - 1
+    np.testing.assert_allclose(
+        found.C[np.ix_(heavy, heavy)], free.C, rtol=1e-8, atol=1e-8 * free.C.max()
+    )
+    assert not np.any(np.delete(found.C, heavy, axis=0))
 
 
 #: Laboratory parts of the two-storey frame: members and masses, interface, what is held there.
@@ -392,6 +407,14 @@ def test_nodes_inside_the_specimen_are_condensed():
     wanted[0, 0] += m / 2
     np.testing.assert_allclose(heavy.laboratory.M, wanted, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(heavy.numerical.M[0, 0], 2000 + 1.5 * m, rtol=1e-9)
+    load = heavy.reference.M @ heavy.reference.influence
+    np.testing.assert_allclose(
+        load[heavy.at], [2000 + 2 * m + m * shape[0].sum(), m * shape[1].sum()], rtol=1e-9
+    )
+    text = column_in_pieces(3, 7850.0)
+    whole = text[: text.index("laboratory")] + text[text.index("[damping]") :]
+    change = 100 * (heavy.reference.frequency[0] / read(whole).reference.frequency[0] - 1)
+    assert any(f"change by {change:+.2g} %" in note for note in heavy.notes) and change != 0
 
 
 def test_a_floors_degree_of_freedom_goes_by_the_name_of_the_interface():
@@ -430,4 +453,4 @@ def test_the_ground_moves_along_any_direction():
 
 
 def test_the_template_is_the_text_that_is_written():
-    assert template().startswith("# The structure of a virtual")
+    assert template().startswith("# A problem of virtual")

@@ -78,6 +78,28 @@ def test_zero_draws_are_nominal_and_others_scatter_about_a_given_plant():
     np.testing.assert_allclose(moved[1], -10 * 1.06, rtol=1e-15)
 
 
+@pytest.mark.parametrize("correlation", [None, R])
+def test_draws_are_found_from_the_values(correlation):
+    both, z = three(correlation=correlation), draws(30, 4)
+    np.testing.assert_allclose(both.draws(both.values(z, 0.3), 0.3), z, rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(both.draws(both.nominal, 0.0), np.zeros((1, 3)))
+    assert Uncertainty().draws(np.zeros((4, 0))).shape == (4, 0)
+
+
+@pytest.mark.parametrize(
+    ("values", "spread", "message"),
+    [
+        ([[2.0, -40.0, 36.1]], 1.0, "be within the uniform distribution of mass, but got 36.1 in"),
+        ([[2.0, -4.0, 30.0], [-2.0, -4.0, 30.0]], 1.0, "lognormal distribution of gain, .* row 1"),
+        ([[2.0, -40.0, 30.0]], 0.0, "be within the uniform distribution of mass, but got 30 in"),
+        ([2.0, -40.0], 1.0, r"have shape \(trials, 3\), but got shape \(1, 2\)"),
+    ],
+)
+def test_values_that_no_draw_gives(values, spread, message):
+    with pytest.raises(InputError, match=message):
+        three().draws(values, spread)
+
+
 def test_derivatives_are_those_of_differences():
     both, z = three(correlation=R), draws(3)
 
@@ -93,7 +115,7 @@ def test_derivatives_are_those_of_differences():
     np.testing.assert_allclose(by_spread, (there - back) / (2 * step), rtol=1e-7)
     # Without spread as well, where the lognormal's s has a root.
     at_rest = jax.grad(total, 1)(z, 0.0)
-    np.testing.assert_allclose(at_rest, (total(z, step) - total(z, 0.0)) / step, rtol=1e-3)
+    np.testing.assert_allclose(at_rest, (total(z, 1e-3) - total(z, -1e-3)) / 2e-3, rtol=1e-5)
 
 
 def test_no_parameters():

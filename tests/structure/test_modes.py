@@ -102,11 +102,11 @@ def test_cantilever_vibrates_as_euler_and_bernoulli_say(angle):
     beta = np.array([1.8751040687119611, 4.694091132974175])
     m = STEEL.density * SLENDER.A
     exact = beta**2 * np.sqrt(STEEL.E * SLENDER.I / (m * 2.0**4))
-    found = [frequencies(n, {"0": FIXED}, **member)[:2] for n in (8, 16, 32)]
+    found = [frequencies(n, {"0": FIXED}, **member)[:2] for n in (6, 12, 24)]
     error = [f / exact - 1 for f in found]
     assert np.all(error[2] > 0)
     for coarse, fine in pairwise(error):
-        np.testing.assert_allclose(np.log2(coarse / fine), 4, atol=0.06)
+        np.testing.assert_allclose(np.log2(coarse / fine), 4, atol=0.1)
     once = limit(found[0], found[1], 4), limit(found[1], found[2], 4)
     np.testing.assert_allclose(limit(*once, 6)[0], exact[0], rtol=1e-9)
     np.testing.assert_allclose(limit(*once, 6), exact, rtol=1e-7)

@@ -70,6 +70,7 @@ class AIC(Controller):
     estimator: Any = None
 
     name = "aic"
+    actuators_needed = 2
     adapts = True
     first_lag_range = 1
     signals = (

@@ -65,6 +65,7 @@ class ATS(AdaptiveFeedforward):
     """Pieces of ``AdaptiveFeedforward`` as the adaptive time series takes them; see ``design``."""
 
     name = "ats"
+    actuators_needed = 2
     first_lag_range = 1
 
     @classmethod

@@ -52,6 +52,7 @@ class RecursiveATS(AdaptiveFeedforward):
     """
 
     name = "ats-rls"
+    actuators_needed = 2
     first_lag_range = 1
 
     @classmethod

@@ -67,6 +67,7 @@ class Decoupling(Controller):
     estimator: Any = None
 
     name = "decoupling"
+    actuators_needed = 2
     shared_axes = MappingProxyType({"band_hz": 0, "lead_ms": 1, "q": 0, "D": 3, "lead": 2})
 
     def problems(self, benchmark):

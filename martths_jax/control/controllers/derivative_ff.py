@@ -60,6 +60,7 @@ class DerivativeFeedforward(Controller):
     estimator: Any = None
 
     name = "derivative-ff"
+    actuators_needed = 2
     first_lag_range = 1
     shared_axes = numbers(*both("gain"), *both("tau"))
 

@@ -51,6 +51,7 @@ class Inverse(Controller):
     estimator: Any = None
 
     name = "inverse"
+    actuators_needed = 2
     first_lag_range = 1
     shared_axes = numbers(*both("gain"), *both("delay"))
 

@@ -67,6 +67,7 @@ class MFFLQG(MFF):
     model: ModalSystem | None = None
 
     name = "mff-lqg"
+    actuators_needed = 2
     signals = (
         Signal("u_fb", ("actuator",), "mm", "command of the regulator", elements=("1", "2")),
     )

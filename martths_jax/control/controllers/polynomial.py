@@ -67,6 +67,7 @@ class Polynomial(Controller):
     shape: tuple[Extrapolation, ...] = field(default=(), metadata={"static": True})
 
     name = "polynomial"
+    actuators_needed = 2
     first_lag_range = 1
     shared_axes = numbers(*both("tau"))
 

@@ -33,6 +33,7 @@ class PolynomialDarby(AdaptingDelay):
     C_v: jax.Array | float = 0.1
 
     name = "polynomial-darby"
+    actuators_needed = 2
     shared_axes = numbers(*both("tau"), "C_p", "C_v")
 
     @property

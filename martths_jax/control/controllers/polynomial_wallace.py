@@ -54,6 +54,7 @@ class PolynomialWallace(AdaptingDelay):
     spacing: float = field(default=4 / 1024, metadata={"static": True})
 
     name = "polynomial-wallace"
+    actuators_needed = 2
     signals = (*SIGNALS, Signal("rho", ("actuator",), "1", "adapted gain"))
     shared_axes = numbers(*both("tau"), "rate", "gain_rate")
 

@@ -106,6 +106,7 @@ class RoDeAC(Controller):
     estimator: Any = None
 
     name = "rodeac"
+    actuators_needed = 2
     adapts = True
     signals = SIGNALS[:1]
     shared_axes = MappingProxyType({"prior_scale": 0, "forgetting": 0, "prior": 3, "start": 2})

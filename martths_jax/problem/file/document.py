@@ -74,7 +74,12 @@ class Document:
         except InputError as error:
             self.fault(path, str(error))
         except np.linalg.LinAlgError:
-            self.fault(path, "Equations of the structure are singular here: something is loose.")
+            sentence = (
+                "Equations of the structure are singular here: something is loose, or has no "
+            )
+            self.fault(path, f"{sentence}size to speak of; check supports and units.")
+        except (ArithmeticError, ValueError):  # SciPy's on numbers that are none
+            self.fault(path, "Numbers of the structure are out of range here: check their units.")
 
     def beside(self, name: str) -> Path:
         """Path of a file that the document names."""

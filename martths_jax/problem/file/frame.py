@@ -9,10 +9,11 @@ from scipy.constants import g as GRAVITY
 
 from martths_jax.errors import InputError
 from martths_jax.problem.file.document import Document
-from martths_jax.problem.file.table import NEEDED, Table, is_number
-from martths_jax.structure.constraints import Relation, diaphragm, rigid_link
+from martths_jax.problem.file.relations import read_relations
+from martths_jax.problem.file.table import Table
+from martths_jax.structure.constraints import Relation
 from martths_jax.structure.members import ENDS, MASSES, Material, Member, Node, member_matrices
-from martths_jax.structure.planar import DIRECTIONS, FIXED, PINNED, PlanarFrame, dof_name
+from martths_jax.structure.planar import DIRECTIONS, FIXED, PINNED, PlanarFrame
 from martths_jax.structure.sections import Section
 from martths_jax.text import nearest
 
@@ -98,7 +99,7 @@ def read_frame(document: Document, start: FrameTables | None = None) -> FrameTab
     _read_members(root, tables)
     _read_supports(root, tables)
     _read_masses(root, tables)
-    _read_relations(root, tables)
+    read_relations(root, tables)
     if document.good:
         _check_loose(document, tables)
     return tables
@@ -181,16 +182,29 @@ def _read_members(root: Table, tables: FrameTables) -> None:
             continue
         member = Member(*ends, section, section, **settings)
         try:
-            _matrices(tables, member)
+            _check_member(tables, member)
         except InputError as error:
             table.fault(None, f"Member {name} {error}")
             continue
         tables.members[name] = member
 
 
-def _matrices(tables: FrameTables, m: Member):
+def _check_member(tables: FrameTables, m: Member) -> None:
+    """Refuse a member without length or with numbers beyond all bounds.
+
+    Raises:
+        InputError: to follow the member's name.
+    """
     section, material = tables.sections[m.section], tables.materials[m.material]
-    return member_matrices(m, section, material, tables.nodes[m.start], tables.nodes[m.end])
+    ends = tables.nodes[m.start], tables.nodes[m.end]
+    try:
+        with np.errstate(all="ignore"):
+            found = member_matrices(m, section, material, *ends)
+        good = np.all(np.isfinite(found))
+    except ArithmeticError:
+        good = False
+    if not good:
+        raise InputError("has a stiffness or a mass beyond all bounds: check its units.")
 
 
 def _read_supports(root: Table, tables: FrameTables) -> None:
@@ -226,48 +240,6 @@ def _read_masses(root: Table, tables: FrameTables) -> None:
 
 def _unknown_node(start: str, node: str, tables: FrameTables) -> str:
     return f"{start} node {node!r}, which is unknown: {nearest(node, tables.known('node'))}."
-
-
-def _read_relations(root: Table, tables: FrameTables) -> None:
-    for table in root.entries("diaphragms"):
-        nodes = table.texts("nodes", tables.known("node"))
-        direction = table.text("direction", ["x", "y"], "x")
-        if len(nodes) > 1 and direction:
-            tables.relations += diaphragm(nodes, direction)
-        elif isinstance(table.data.get("nodes"), list) and len(table.data["nodes"]) < 2:
-            table.wrong("nodes", "be a list of at least two nodes")
-    for table in root.entries("rigid_links"):
-        leader = table.text("leader", tables.known("node"))
-        followers = table.texts("followers", tables.known("node"))
-        if leader in followers:
-            table.wrong("followers", f"be other nodes than the leader, {leader}")
-        elif leader and table.document.good:
-            tables.relations += rigid_link(tables.nodes, leader, *followers)
-    for table in root.entries("constraints"):
-        _read_constraint(table, tables)
-
-
-def _read_constraint(table: Table, tables: FrameTables) -> None:
-    """One relation; its coefficients have the unit of a length where translations meet turns."""
-    known = [*tables.dofs, *(f"{node}.r" for node in tables.known("node"))]
-    follower = table.text("dof", known)
-    terms = table.table("equals")
-    if terms is None:
-        if "equals" not in table.data:
-            table.wrong("equals", 'be a table such as {"2.x" = 1.0}')
-        return
-    found = {}
-    for name in terms.keys():
-        if not terms.is_known(name, name, known):
-            continue
-        if not is_number(terms.data[name]):
-            terms.wrong(name, "be a finite number")
-            continue
-        turns = [dof_name(dof).endswith(".rotation") for dof in (follower or "", name)]
-        arm = table.document.units.factor("m") ** (turns[1] - turns[0])
-        found[dof_name(name)] = terms.number(name, default=NEEDED) * arm
-    if follower and found:
-        tables.relations.append(Relation(dof_name(follower), found))
 
 
 def _check_loose(document: Document, tables: FrameTables) -> None:

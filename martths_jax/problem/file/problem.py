@@ -19,6 +19,7 @@ from martths_jax.problem.base import Problem, Reading
 from martths_jax.problem.file.document import Document, read_document
 from martths_jax.problem.file.rig import RigData, read_rig
 from martths_jax.problem.file.structure import StructureData, read_structure
+from martths_jax.published import ANYWHERE
 from martths_jax.rig import plants
 from martths_jax.rig.specimen import LinearSpecimen
 from martths_jax.runtime import check_runtime
@@ -166,7 +167,7 @@ def _made(path: Path, stamp: tuple) -> Problem:
         noise=partial(_noise, len(rig.actuators)),
         settings={
             "fs": made.fs, "integrator": made.integrator, "noise_power": rig.noise_power,
-            "noise_shared": rig.noise_shared, "controllers": ("adfc", "passthrough"),
+            "noise_shared": rig.noise_shared, "controllers": ANYWHERE,
         },
         files=made.files,
         sha256=made.sha256,
