@@ -50,7 +50,7 @@ _HELP = {
     "indices": f"What is evaluated: {', '.join(GROUPS)}, names such as J2_1 or TI, "
     "package.module:NAME or path/file.py:NAME; repeated or with commas",
     "out": "Where the results go",
-    "plants": "CSV file of the nine parameters of each plant",
+    "plants": "CSV file of the uncertain parameters of each plant",
     "signals": "Signals of chosen trials too",
     "memory_gb": "Bound on the memory of the noise of a chunk of trials [GB]",
 }
