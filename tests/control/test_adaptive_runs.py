@@ -23,6 +23,7 @@ MODULES = (
     "error_model",
     "adfc_rls",
     "adfc_weighted",
+    "amb",
 )
 
 

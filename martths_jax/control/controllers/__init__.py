@@ -6,6 +6,7 @@ from martths_jax.control.controllers import (
     adfc_rls,
     adfc_weighted,
     aic,
+    amb,
     ats,
     ats_rls,
     decoupling,
@@ -26,6 +27,7 @@ from martths_jax.control.controllers.adfc import ADFC
 from martths_jax.control.controllers.adfc_rls import RecursiveADFC
 from martths_jax.control.controllers.adfc_weighted import WeightedADFC
 from martths_jax.control.controllers.aic import AIC
+from martths_jax.control.controllers.amb import AMB
 from martths_jax.control.controllers.ats import ATS
 from martths_jax.control.controllers.ats_rls import RecursiveATS
 from martths_jax.control.controllers.decoupling import Decoupling
@@ -65,11 +67,13 @@ ENTRIES = (
     error_model.ENTRY,
     adfc_rls.ENTRY,
     adfc_weighted.ENTRY,
+    amb.ENTRY,
 )
 
 __all__ = [
     "ADFC",
     "AIC",
+    "AMB",
     "ATS",
     "ENTRIES",
     "LQG",
