@@ -24,6 +24,7 @@ MODULES = (
     "adfc_rls",
     "adfc_weighted",
     "amb",
+    "two_stage",
 )
 
 

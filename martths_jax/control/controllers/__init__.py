@@ -22,6 +22,7 @@ from martths_jax.control.controllers import (
     polynomial_darby,
     polynomial_wallace,
     rodeac,
+    two_stage,
 )
 from martths_jax.control.controllers.adfc import ADFC
 from martths_jax.control.controllers.adfc_rls import RecursiveADFC
@@ -45,6 +46,7 @@ from martths_jax.control.controllers.polynomial import Polynomial
 from martths_jax.control.controllers.polynomial_darby import PolynomialDarby
 from martths_jax.control.controllers.polynomial_wallace import PolynomialWallace
 from martths_jax.control.controllers.rodeac import RoDeAC
+from martths_jax.control.controllers.two_stage import TwoStage
 
 #: What can be named without a path, in the order of help texts.
 ENTRIES = (
@@ -68,6 +70,7 @@ ENTRIES = (
     adfc_rls.ENTRY,
     adfc_weighted.ENTRY,
     amb.ENTRY,
+    two_stage.ENTRY,
 )
 
 __all__ = [
@@ -96,5 +99,6 @@ __all__ = [
     "RecursiveADFC",
     "RecursiveATS",
     "RoDeAC",
+    "TwoStage",
     "WeightedADFC",
 ]
