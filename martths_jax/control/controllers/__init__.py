@@ -22,6 +22,7 @@ from martths_jax.control.controllers import (
     polynomial_darby,
     polynomial_wallace,
     rodeac,
+    three_variable,
     two_stage,
 )
 from martths_jax.control.controllers.adfc import ADFC
@@ -46,6 +47,7 @@ from martths_jax.control.controllers.polynomial import Polynomial
 from martths_jax.control.controllers.polynomial_darby import PolynomialDarby
 from martths_jax.control.controllers.polynomial_wallace import PolynomialWallace
 from martths_jax.control.controllers.rodeac import RoDeAC
+from martths_jax.control.controllers.three_variable import ThreeVariable
 from martths_jax.control.controllers.two_stage import TwoStage
 
 #: What can be named without a path, in the order of help texts.
@@ -71,6 +73,7 @@ ENTRIES = (
     adfc_weighted.ENTRY,
     amb.ENTRY,
     two_stage.ENTRY,
+    three_variable.ENTRY,
 )
 
 __all__ = [
@@ -99,6 +102,7 @@ __all__ = [
     "RecursiveADFC",
     "RecursiveATS",
     "RoDeAC",
+    "ThreeVariable",
     "TwoStage",
     "WeightedADFC",
 ]
