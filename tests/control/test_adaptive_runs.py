@@ -25,6 +25,8 @@ MODULES = (
     "adfc_weighted",
     "amb",
     "two_stage",
+    "sliding_adm",
+    "sliding_switching",
 )
 
 

@@ -22,6 +22,8 @@ from martths_jax.control.controllers import (
     polynomial_darby,
     polynomial_wallace,
     rodeac,
+    sliding_adm,
+    sliding_switching,
     three_variable,
     two_stage,
 )
@@ -47,6 +49,8 @@ from martths_jax.control.controllers.polynomial import Polynomial
 from martths_jax.control.controllers.polynomial_darby import PolynomialDarby
 from martths_jax.control.controllers.polynomial_wallace import PolynomialWallace
 from martths_jax.control.controllers.rodeac import RoDeAC
+from martths_jax.control.controllers.sliding_adm import SlidingADM
+from martths_jax.control.controllers.sliding_switching import SlidingSwitching
 from martths_jax.control.controllers.three_variable import ThreeVariable
 from martths_jax.control.controllers.two_stage import TwoStage
 
@@ -74,6 +78,8 @@ ENTRIES = (
     amb.ENTRY,
     two_stage.ENTRY,
     three_variable.ENTRY,
+    sliding_adm.ENTRY,
+    sliding_switching.ENTRY,
 )
 
 __all__ = [
@@ -102,6 +108,8 @@ __all__ = [
     "RecursiveADFC",
     "RecursiveATS",
     "RoDeAC",
+    "SlidingADM",
+    "SlidingSwitching",
     "ThreeVariable",
     "TwoStage",
     "WeightedADFC",
