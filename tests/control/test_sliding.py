@@ -61,9 +61,9 @@ def test_the_start_makes_up_for_the_lag_behind_a_ramp(benchmark, plant, kind):
     np.testing.assert_allclose(start, [[1, 1], np.diag(expected) / 0.02, [0, 0]], rtol=1e-5)
 
 
-def run(made, benchmark, x_a, x_m):
-    """Commands and signals (N, ..., T) of the box on given strokes."""
-    box = Compensator.of(made, benchmark)
+def driven_box(ready, benchmark, x_a, x_m):
+    """Commands and signals (N, ..., T) of a prepared controller and its filter on strokes."""
+    box = Compensator(ready, ready.estimator, benchmark.dt)
 
     def sample(state, given):
         state, command, signals = box.step(state, *given)
@@ -105,7 +105,7 @@ def test_the_linear_law_is_its_equations(benchmark, plant):
     x_a, x_m = strokes(200, trials=1), strokes(200, trials=1, seed=9)
     made = SlidingADM(e=E, reach=40.0, q=1e-3)
     assert not made.problems(benchmark)
-    u, said = run(made, benchmark, x_a, x_m)
+    u, said = driven_box(made.prepare(benchmark), benchmark, x_a, x_m)
     theta = said["C_A"][..., 0]
     assert np.ptp(theta, axis=0).min() > 1e-3, "the model adapts"
     r, expected, _ = oracle(benchmark, plant, x_a[..., 0], x_m[..., 0], theta, 40.0, 1e-3)
@@ -117,7 +117,7 @@ def test_the_switching_law_is_its_equations(benchmark, plant):
     x_a, x_m = strokes(200, trials=1), strokes(200, trials=1, seed=9)
     made = SlidingSwitching(e=E, reach=40.0, q=1e-3, switch=50.0, layer=0.3)
     assert not made.problems(benchmark)
-    u, said = run(made, benchmark, x_a, x_m)
+    u, said = driven_box(made.prepare(benchmark), benchmark, x_a, x_m)
     given = benchmark, plant, x_a[..., 0], x_m[..., 0], said["C_A"][..., 0], 40.0, 1e-3
     r, expected, s = oracle(*given, 50.0, 0.3)
     np.testing.assert_allclose(said["r"][..., 0], r, rtol=1e-9, atol=1e-9)
@@ -128,18 +128,13 @@ def test_the_switching_law_is_its_equations(benchmark, plant):
 @pytest.mark.parametrize("kind", [SlidingADM, SlidingSwitching])
 def test_frozen_it_is_what_does_not_adapt(benchmark, kind):
     x_a, x_m = strokes(80), strokes(80, seed=9)
-    made = kind(threshold=1e9)
-    start = np.asarray(made.prepare(benchmark).outer.start)
-    settled = made.frozen(benchmark, start)
+    theta = jnp.array([[1.1, 0.9], [0.5, 0.8], [0.1, -0.1]])
+    still = kind(threshold=1e9).prepare(benchmark)
+    still = replace(still, outer=replace(still.outer, start=theta))
+    settled = kind().frozen(benchmark, theta)
     assert not settled.adapts
-    box = replace(Compensator.of(made, benchmark), controller=settled)
-    state, found = box.init(3), []
-    step = jax.jit(box.step)
-    for one, other in zip(x_a, x_m, strict=True):
-        state, u, _ = step(state, jnp.asarray(one), jnp.asarray(other))
-        found.append(u)
-    expected = run(made, benchmark, x_a, x_m)[0]
-    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10)
+    u, expected = (driven_box(c, benchmark, x_a, x_m)[0] for c in (settled, still))
+    np.testing.assert_allclose(u, expected, rtol=1e-10, atol=1e-10)
 
 
 @pytest.mark.slow
