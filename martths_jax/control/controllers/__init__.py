@@ -16,6 +16,7 @@ from martths_jax.control.controllers import (
     lqg,
     mff,
     mff_lqg,
+    ning_ff_fb,
     passthrough,
     phase_lead,
     polynomial,
@@ -43,6 +44,7 @@ from martths_jax.control.controllers.inverse import Inverse
 from martths_jax.control.controllers.lqg import LQG
 from martths_jax.control.controllers.mff import MFF
 from martths_jax.control.controllers.mff_lqg import MFFLQG
+from martths_jax.control.controllers.ning_ff_fb import NingFFFB
 from martths_jax.control.controllers.passthrough import Passthrough
 from martths_jax.control.controllers.phase_lead import PhaseLead
 from martths_jax.control.controllers.polynomial import Polynomial
@@ -80,6 +82,7 @@ ENTRIES = (
     three_variable.ENTRY,
     sliding_adm.ENTRY,
     sliding_switching.ENTRY,
+    ning_ff_fb.ENTRY,
 )
 
 __all__ = [
@@ -99,6 +102,7 @@ __all__ = [
     "ErrorModel",
     "FrozenFeedforward",
     "Inverse",
+    "NingFFFB",
     "Observation",
     "Passthrough",
     "PhaseLead",
