@@ -16,6 +16,7 @@ from martths_jax.control.controllers import (
     lqg,
     mff,
     mff_lqg,
+    network_inverse,
     ning_ff_fb,
     passthrough,
     phase_lead,
@@ -44,6 +45,7 @@ from martths_jax.control.controllers.inverse import Inverse
 from martths_jax.control.controllers.lqg import LQG
 from martths_jax.control.controllers.mff import MFF
 from martths_jax.control.controllers.mff_lqg import MFFLQG
+from martths_jax.control.controllers.network_inverse import NetworkInverse
 from martths_jax.control.controllers.ning_ff_fb import NingFFFB
 from martths_jax.control.controllers.passthrough import Passthrough
 from martths_jax.control.controllers.phase_lead import PhaseLead
@@ -83,6 +85,7 @@ ENTRIES = (
     sliding_adm.ENTRY,
     sliding_switching.ENTRY,
     ning_ff_fb.ENTRY,
+    network_inverse.ENTRY,
 )
 
 __all__ = [
@@ -102,6 +105,7 @@ __all__ = [
     "ErrorModel",
     "FrozenFeedforward",
     "Inverse",
+    "NetworkInverse",
     "NingFFFB",
     "Observation",
     "Passthrough",
