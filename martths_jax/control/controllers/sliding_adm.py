@@ -150,11 +150,7 @@ class SlidingADM(Controller):
     def follow(self, state, r, seen):
         """The inner loop after a sample with its reference r (2, T): its state, and u (2, T)."""
         error = state + seen.dt * (r - seen.x_hat)
-        return error, self.linear(error, seen)
-
-    def linear(self, error, seen):
-        """Command of the integrated law, from the integral of r - x_hat."""
-        return contract(self.K_e, error) - contract(self.K, seen.state, axes=2)
+        return error, contract(self.K_e, error) - contract(self.K, seen.state, axes=2)
 
 
 @jax.tree_util.register_dataclass

@@ -83,17 +83,21 @@ class SlidingSwitching(SlidingADM):
         )
 
     def init_inner(self, trials):
-        """The integral of r - x_hat, that of the switching term, and u(k-1), (2, T) each."""
-        return (jnp.zeros((2, trials)),) * 3
+        """The sum of all that is integrated, and u(k-1), (2, T) each.
+
+        One sum: two would stand still together wherever they cancel.
+        """
+        return (jnp.zeros((2, trials)),) * 2
 
     def follow(self, state, r, seen):
-        error, switched, before = state
+        summed, before = state
+        error = r - seen.x_hat
         s = contract(self.S_z, seen.state, axes=2)
-        s = contract(self.S_u, before, start=contract(self.S_e, r - seen.x_hat, start=s))
-        error = error + seen.dt * (r - seen.x_hat)
-        switched = switched + seen.dt * self.switch * jnp.clip(s / self.layer, -1.0, 1.0)
-        u = self.linear(error, seen) - switched - contract(self.S_e, r)
-        return (error, switched, u), u
+        s = contract(self.S_u, before, start=contract(self.S_e, error, start=s))
+        switched = self.switch * jnp.clip(s / self.layer, -1.0, 1.0)
+        summed = summed + seen.dt * (contract(self.K_e, error) - switched)
+        u = summed - contract(self.K, seen.state, axes=2) - contract(self.S_e, r)
+        return (summed, u), u
 
 
 _of_linear = {p.name: p for p in LINEAR.parameters}
