@@ -24,8 +24,8 @@ def driven(controller, benchmark, x_a, x_hat=None):
     return jax.tree.map(np.asarray, jax.lax.scan(step, controller.init(x_a.shape[2]), series)[1])
 
 
-def late_rig(controller, benchmark, x_a, delays, size=1.0):
-    """Strokes and delays (N, 2) of a rig: stroke i is `size` of the command so long ago."""
+def late_rig(controller, benchmark, x_a, delays, size=1.0, signal="tau"):
+    """Strokes (N, 2) and a signal of a rig: stroke i is `size` of the command so long ago."""
     dt, line = jnp.asarray(benchmark.dt), jnp.zeros((max(delays), 2))
 
     def step(carry, given):
@@ -34,7 +34,7 @@ def late_rig(controller, benchmark, x_a, delays, size=1.0):
         x = size * jnp.stack([line[d - 1, i] for i, d in enumerate(delays)])[:, None]
         state, said = controller.step(state, Observation(k, dt, target[:, None], x, x, (), None))
         line = jnp.concatenate([said.u.T, line[:-1]])
-        return (state, line), (x[:, 0], said.signals["tau"][:, 0])
+        return (state, line), (x[:, 0], said.signals[signal][..., 0])
 
     series = jnp.arange(len(x_a)), jnp.asarray(x_a)
     return [np.asarray(a) for a in jax.lax.scan(step, (controller.init(1), line), series)[1]]

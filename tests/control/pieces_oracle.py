@@ -39,11 +39,11 @@ def engine(controller, benchmark, target=TARGET, noise=NOISE):
 
 
 def textbook(matrix, joint, learn, *, start=None, law=lambda u: u, both=lambda x: x,
-             target=TARGET, noise=NOISE):  # fmt: skip
+             target=TARGET, noise=NOISE, of_targets=None):  # fmt: skip
     """The same by textbook: every sample looks at the whole past again.
 
     Args:
-        matrix: (n, taps) of the regressor.
+        matrix: (n, taps) of the regressor; of_targets: of that of the targets, if it is another.
         joint: one problem, or one an actuator.
         learn: (k, Phi (k+1, n), U (k+1, sides), last (n, sides), part) -> coefficients, fits held.
         start: (n, 2) coefficients; None follows the target.
@@ -58,7 +58,8 @@ def textbook(matrix, joint, learn, *, start=None, law=lambda u: u, both=lambda x
         for k in range(len(target)):
             x = np.vstack([x, PLANT @ u[-1] + noise[k, :, trial]])
             phi, applied = regressors(matrix, both(x)), both(u)
-            of_target = regressors(matrix, target[: k + 1, :, trial])[-1]
+            own = matrix if of_targets is None else of_targets
+            of_target = regressors(own, target[: k + 1, :, trial])[-1]
             new = np.zeros_like(last)
             for part, sides in enumerate([[0, 1]] if joint else [[0], [1]]):
                 own = phi.reshape(k + 1, -1) if joint else phi[:, part]

@@ -30,6 +30,10 @@ MODULES = (
     "ekf_ss",
     "ukf_ss",
     "adfc_akf",
+    "amb",
+    "two_stage",
+    "sliding_adm",
+    "sliding_switching",
 )
 
 

@@ -47,6 +47,22 @@ def nominal_inverse(
         (n d, n) coefficients of n actuators.
     """
     A, B, C, _ = to_dense(model)
+    return dense_inverse(
+        (A, B, C), fs, differences, band_hz=band_hz, noise_share=noise_share, points=points
+    )
+
+
+def dense_inverse(
+    plant: tuple[np.ndarray, np.ndarray, np.ndarray],
+    fs: float,
+    differences: np.ndarray,
+    *,
+    band_hz: float = BAND_HZ,
+    noise_share: float = NOISE_SHARE,
+    points: int = 400,
+) -> np.ndarray:
+    """``nominal_inverse`` of any system (A, B, C) with as many strokes as commands."""
+    A, B, C = plant
     d, taps = differences.shape
     n = len(C)
     z = np.exp(2j * np.pi * np.linspace(0, min(band_hz, fs / 2), points + 1)[1:] / fs)

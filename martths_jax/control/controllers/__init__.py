@@ -7,6 +7,7 @@ from martths_jax.control.controllers import (
     adfc_rls,
     adfc_weighted,
     aic,
+    amb,
     ats,
     ats_rls,
     cats_mpc,
@@ -20,6 +21,8 @@ from martths_jax.control.controllers import (
     lqg,
     mff,
     mff_lqg,
+    network_inverse,
+    ning_ff_fb,
     passthrough,
     phase_lead,
     pi_lead,
@@ -27,6 +30,10 @@ from martths_jax.control.controllers import (
     polynomial_darby,
     polynomial_wallace,
     rodeac,
+    sliding_adm,
+    sliding_switching,
+    three_variable,
+    two_stage,
     ukf_ss,
     ukf_tf,
 )
@@ -35,6 +42,7 @@ from martths_jax.control.controllers.adfc_akf import AdaptiveFilterADFC
 from martths_jax.control.controllers.adfc_rls import RecursiveADFC
 from martths_jax.control.controllers.adfc_weighted import WeightedADFC
 from martths_jax.control.controllers.aic import AIC
+from martths_jax.control.controllers.amb import AMB
 from martths_jax.control.controllers.ats import ATS
 from martths_jax.control.controllers.ats_rls import RecursiveATS
 from martths_jax.control.controllers.cats_mpc import CATSMPC
@@ -50,6 +58,8 @@ from martths_jax.control.controllers.inverse import Inverse
 from martths_jax.control.controllers.lqg import LQG
 from martths_jax.control.controllers.mff import MFF
 from martths_jax.control.controllers.mff_lqg import MFFLQG
+from martths_jax.control.controllers.network_inverse import NetworkInverse
+from martths_jax.control.controllers.ning_ff_fb import NingFFFB
 from martths_jax.control.controllers.passthrough import Passthrough
 from martths_jax.control.controllers.phase_lead import PhaseLead
 from martths_jax.control.controllers.pi_lead import LeadAndPI
@@ -57,6 +67,10 @@ from martths_jax.control.controllers.polynomial import Polynomial
 from martths_jax.control.controllers.polynomial_darby import PolynomialDarby
 from martths_jax.control.controllers.polynomial_wallace import PolynomialWallace
 from martths_jax.control.controllers.rodeac import RoDeAC
+from martths_jax.control.controllers.sliding_adm import SlidingADM
+from martths_jax.control.controllers.sliding_switching import SlidingSwitching
+from martths_jax.control.controllers.three_variable import ThreeVariable
+from martths_jax.control.controllers.two_stage import TwoStage
 from martths_jax.control.controllers.ukf_ss import UKFSS
 from martths_jax.control.controllers.ukf_tf import UKFTF
 
@@ -89,11 +103,19 @@ ENTRIES = (
     ekf_ss.ENTRY,
     ukf_ss.ENTRY,
     adfc_akf.ENTRY,
+    amb.ENTRY,
+    two_stage.ENTRY,
+    three_variable.ENTRY,
+    sliding_adm.ENTRY,
+    sliding_switching.ENTRY,
+    ning_ff_fb.ENTRY,
+    network_inverse.ENTRY,
 )
 
 __all__ = [
     "ADFC",
     "AIC",
+    "AMB",
     "ATS",
     "CATSMPC",
     "CATSPID",
@@ -115,6 +137,8 @@ __all__ = [
     "FrozenFeedforward",
     "Inverse",
     "LeadAndPI",
+    "NetworkInverse",
+    "NingFFFB",
     "Observation",
     "Passthrough",
     "PhaseLead",
@@ -124,5 +148,9 @@ __all__ = [
     "RecursiveADFC",
     "RecursiveATS",
     "RoDeAC",
+    "SlidingADM",
+    "SlidingSwitching",
+    "ThreeVariable",
+    "TwoStage",
     "WeightedADFC",
 ]
