@@ -210,7 +210,8 @@ def test_the_table_of_controllers_is_the_committed_run():
     page = (ROOT / "docs" / "controllers.md").read_text("utf-8")
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [row["controller"] for row in rows] == [entry.name for entry in ENTRIES]
+    of_marths = [entry.name for entry in ENTRIES if entry.problem == "marths"]
+    assert [row["controller"] for row in rows] == of_marths
     for row in rows:
         cells = " | ".join(
             f"{float(row[f'{n}_median']):.1f} ({float(row[f'{n}_largest']):.1f})"
