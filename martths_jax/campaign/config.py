@@ -161,10 +161,13 @@ def _from_mapping(settings: dict) -> StudyConfig:
 
 def _usual(settings: dict) -> dict:
     """Settings of the problem that is meant, where they are other than a study's usual ones."""
-    try:
-        problem = find_problem(settings.get("problem", StudyConfig.problem), settings.get("case"))
-    except InputError:
+    name, case = settings.get("problem", StudyConfig.problem), settings.get("case")
+    if not (BY_NAME["problem"].good(name) and BY_NAME["case"].good(case)):
         return {}  # said by ``StudyConfig.problems``
+    try:
+        problem = find_problem(name, case)
+    except InputError:
+        return {}  # likewise
     return dict(problem.settings)
 
 

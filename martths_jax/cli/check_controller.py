@@ -11,7 +11,7 @@ from rich.markup import escape
 from martths_jax.benchmark import build_benchmark
 from martths_jax.cli.console import console, progress
 from martths_jax.cli.motion_options import Records
-from martths_jax.cli.options import option, setting
+from martths_jax.cli.options import one_of, option, setting
 from martths_jax.conformity import check
 from martths_jax.conformity.run import CHECKS, MOTION, SEED
 from martths_jax.motions import load_motion
@@ -29,9 +29,7 @@ def check_controller(
     controller: Name,
     quick: option(bool, "--quick", help="Leave out the checks that run the whole loop") = False,
     as_json: option(bool, "--json", help="Print the findings as JSON") = False,
-    motion: option(
-        str, "--motion", metavar="NAME|FILE", help="Motion that the whole loop runs on"
-    ) = MOTION,
+    motion: setting("motions", MOTION) = None,
     records: Records = None,
     seed: setting("seed", SEED) = None,
     fs: setting("fs") = 1024.0,
@@ -41,7 +39,7 @@ def check_controller(
     The exit code is 1 where a check fails, and each failure says what to change.
     """
     benchmark = build_benchmark(fs)
-    ground = load_motion(motion, fs=fs, records=records)
+    ground = load_motion(one_of("--motion", motion) or MOTION, fs=fs, records=records)
     with progress(f"checking {controller}", len(CHECKS)) as tell:
         report = check(
             controller, benchmark, motion=ground, seed=SEED if seed is None else seed, quick=quick,

@@ -8,6 +8,7 @@ import pytest
 import scipy.io
 
 from martths_jax import ADFC, InputError, build_benchmark
+from martths_jax.benchmark import LAYOUT
 from martths_jax.campaign.formats.mat import write_mat
 from martths_jax.campaign.parts import part_bytes, read_part
 from martths_jax.figures import drawings, figure_list
@@ -78,7 +79,7 @@ def test_matlab_and_page(study, tmp_path):
     assert "mean_2" in [str(np.squeeze(n)) for n in stored["index"].ravel()]
     page = trial_payload(study, np.arange(4))
     assert {"name": "TI_1", "unit": "mm²"} in page["indices"]
-    lines = {line["name"] for h in history_payload(kept_signals(study), 1024.0, 10**7)
+    lines = {line["name"] for h in history_payload(kept_signals(study), 1024.0, 10**7, LAYOUT)
              for line in h["signals"]}  # fmt: skip
     assert {"u1: x1", "u2: x2'''", "error 1"} <= lines and not {"held", "C_A"} & lines
 

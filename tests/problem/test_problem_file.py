@@ -229,3 +229,23 @@ def test_controllers_take_any_number_of_actuators_or_say_which(name):
                 entry.build(built)
             continue
         check_controller(made.prepare(built), built, 4)
+
+
+def test_what_the_examples_page_says_is_what_was_run():
+    """Largest medians of J2 and J8, and lost trials, out of the committed summaries."""
+    page = (EXAMPLES / "README.md").read_text("utf-8")
+    for name in ("tall_frame", "loading_unit", "shear_building"):
+        text = (EXAMPLES / "results" / f"{name}.md").read_text("utf-8")
+        cells = []
+        for controller in ("adfc", "passthrough"):
+            head = rf"## {controller} on elcentro-like: (\d+) of 64 trials\n(.*?)\n## "
+            whole, table = re.search(head, text, re.DOTALL).groups()
+            found = []
+            for group in ("J2", "J8"):
+                medians = re.findall(
+                    rf"^\| {group}_\S+ \[%\] \|[^|]*\| ([\d.]+) ", table, re.MULTILINE
+                )
+                largest = max(map(float, medians), default=None)
+                found.append("–" if largest is None else f"{largest:.{0 if largest >= 10 else 1}f}")
+            cells.append(f"{', '.join(found)}, {64 - int(whole)}")
+        assert f"| {name} | {cells[0]} | {cells[1]} |" in page, (name, cells)

@@ -73,11 +73,11 @@ def test_results_that_do_not_fit_are_refused_before_they_run(tmp_path):
 @pytest.mark.parametrize(("kind", "trials"), [("sobol", 2**30 + 1), ("lhs", MOST_TRIALS)])
 def test_even_draws_that_cannot_be_made(kind, trials, monkeypatch):
     with pytest.raises(InputError, match=f"`trials` must be at most .* {kind} draws"):
-        even_draws(kind, trials, 1)
+        even_draws(kind, trials, 1, 9)
     monkeypatch.setattr(draws_module, "available_memory", lambda: 1e5)
     with pytest.raises(InputError, match="at most 347"):
-        even_draws(kind, 400, 1)
-    assert even_draws(kind, 8, 1).shape == (8, 9)
+        even_draws(kind, 400, 1, 9)
+    assert even_draws(kind, 8, 1, 9).shape == (8, 9)
 
 
 def test_buffers_beyond_memory(tmp_path, benchmark):

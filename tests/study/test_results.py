@@ -140,7 +140,7 @@ def test_the_commands(tmp_path):
              "--motion", record(tmp_path / "r.csv"), "--out", out, "--no-signals"]  # fmt: skip
     done = run(*words)
     assert done.exit_code == 0, done.output
-    assert "Table 4" in done.output and "Seed 1;" in done.output
+    assert "Nominal plant" in done.output and "Seed 1;" in done.output
     assert "6 of 6 trials" in done.output and "compiled in" in done.output
     quiet = run(*words, "--quiet")
     assert quiet.exit_code == 0 and quiet.output == ""

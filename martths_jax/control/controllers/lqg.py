@@ -242,7 +242,7 @@ def lqg_from_weights(
     return LQG(K_z=K_z, K_e=K_e, estimator=estimator, error=error)
 
 
-def check_weights(e, r, y, q, actuators: int) -> None:
+def check_weights(e, r, y, q, actuators: int = 2) -> None:
     """Refuse weights of ``LQG.design`` that are no numbers, out of range or not one an actuator.
 
     Raises:
