@@ -157,7 +157,8 @@ def delay(source: Source) -> Drawing:
             run = source.history(name, source.motion)
             f, late = spectral_delay(run["x_a"][:, i], run["x_m"][:, i], source.fs)
             axis.plot(f, late, **line(source.position(name)), label=f"with {source.label(name)}")
-            data[f"{name}_{called[i]}_ms"] = np.interp(FREQUENCY, f, late, np.nan, np.nan)
+            known = np.interp(FREQUENCY, f, late, np.nan, np.nan) if f.size else np.nan * FREQUENCY
+            data[f"{name}_{called[i]}_ms"] = known
         axis.axhline(0, color="0.4", lw=0.6)
         axis.set_xscale("log")
         axis.set(xlim=(0.2, 30), xlabel="frequency [Hz]", title=f"actuator {called[i]}")

@@ -82,7 +82,7 @@ def _ranges(
         axis.grid(axis="x", visible=False)
         for edge in range(len(names) - 1):
             axis.axvline(edge + 0.5, color="0.9", lw=0.4, zorder=0)
-        if unit == "%" and smallest > 0:
+        if unit == "%" and 0 < smallest < np.inf:
             axis.set_yscale("log")
             _plain_log_ticks(axis.yaxis)
     handles, labels = axes[-1].get_legend_handles_labels()

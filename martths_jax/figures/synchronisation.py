@@ -61,7 +61,9 @@ def _subspace(source, pick, names, units, wanted, reached, coordinates, columns)
             axis = panels[i]
             x, y = pick(run, i)
             axis.plot(x, y, color=look(source.position(name))["color"], lw=0.4)
-            end = 1.08 * max(np.nanmax(np.abs(x)), np.nanmax(np.abs(y)))
+            sizes = np.abs(np.concatenate([x, y]))
+            # A trial that ran away may hold no finite number at all.
+            end = 1.08 * np.max(sizes[np.isfinite(sizes)], initial=0.0) or 1.0
             axis.plot([-end, end], [-end, end], color="black", ls=(0, (2, 2)), lw=0.7)
             axis.set(xlim=(-end, end), ylim=(-end, end), aspect="equal")
             axis.locator_params(nbins=5)

@@ -72,8 +72,13 @@ def three_actuators():
         _made.cache_clear()
 
 
-def invented(folder: Path, name: str, case: int | None, controllers: tuple[str, ...]) -> Path:
-    """Write a study: indices that spread about their number, strokes late by two samples."""
+def invented(
+    folder: Path, name: str, case: int | None, controllers: tuple[str, ...], lost: bool = False
+) -> Path:
+    """Write a study: indices that spread about their number, strokes late by two samples.
+
+    With `lost` the first controller has lost all of its trials, and its strokes are no numbers.
+    """
     problem = find_problem(name, case)
     layout, rng = problem.layout, np.random.default_rng(1)
     indices = groups_of(layout)["benchmark"]
@@ -82,11 +87,14 @@ def invented(folder: Path, name: str, case: int | None, controllers: tuple[str, 
     draws = rng.standard_normal((TRIALS + 1, len(problem.parameters)))
     draws[0] = 0.0
     runs = ("controller", "motion", "trial")
+    status = np.full(cell, int(Status.OK), dtype=np.int32)
     value = level * (1 + 0.1 * rng.standard_normal((*cell, level.size)))
+    if lost:
+        value[0], status[0] = np.nan, int(Status.DIVERGED)
     dataset = xr.Dataset(
         {
             "value": ((*runs, "index"), value),
-            "status": (runs, np.full(cell, int(Status.OK), dtype=np.int32)),
+            "status": (runs, status),
             "volt_peak": ((*runs, "actuator"), np.ones((*cell, n))),
             "unit": ("index", ["ms" if i.unit == "ms" else "percent" for i in indices]),
             "draw": (("trial", "parameter"), draws),
@@ -110,6 +118,8 @@ def invented(folder: Path, name: str, case: int | None, controllers: tuple[str, 
     for controller in controllers:
         roles = choose_trials(dataset, controller, MOTION, ())
         stored = _signals(layout, roles, adapted=controller == controllers[-1])
+        if lost and controller == controllers[0]:
+            stored["x_m"] = stored.x_m * np.nan
         write_dataset(stored, path, group(MOTION, controller))
     return folder
 

@@ -98,6 +98,15 @@ def test_histories_are_the_stored_signals_under_their_names(study):
         assert {t.rpartition(", ")[2] for t in titles} == {"translation"}
 
 
+def test_a_controller_that_lost_every_trial_leaves_the_figures_of_the_others(tmp_path):
+    folder = invented(tmp_path / "study", "uniaxial", 1, ("passthrough", "pi-lead"), lost=True)
+    found = drawn(folder)
+    assert set(found) == set(figure_list(open_source(folder)))
+    assert np.isnan(found["delay"].data["passthrough_1_ms"]).all()
+    assert np.isfinite(found["delay"].data["pi-lead_1_ms"]).any()
+    assert np.isnan(found["fig14b_motions_passthrough"].data["P50"]).all()
+
+
 def test_coefficients_belong_to_their_derivative(three):
     data = drawn(three)["fig11_coefficients"].data
     step = 1e3 / 1024
