@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from martths_jax.figures import drawings, open_source, plants, spread
+from martths_jax.plant import plant_from_hz
 from martths_jax.report import page, payload, study_tables, write_report
 from martths_jax.study import open_study
 from martths_jax.study.summary import number
@@ -97,12 +98,15 @@ def test_tables_and_curves_are_those_of_all_trials(folder):
 
 def test_bands_do_not_depend_on_the_blocks(study_folder, monkeypatch):
     """The phase goes on from block to block as if there were one."""
-    hz = np.asarray(open_study(study_folder).dataset.plant_hz.values)
-    whole = [*plants._magnitude_and_phase(hz, plants._percentiles)]
-    whole.append(plants._plant_delay(hz, 1024.0, plants._percentiles))
-    monkeypatch.setattr(plants, "BLOCK", 4 * 2 * len(hz))
-    parts = [*plants._magnitude_and_phase(hz, plants._percentiles)]
-    parts.append(plants._plant_delay(hz, 1024.0, plants._percentiles))
+    drawn = plant_from_hz(np.asarray(open_study(study_folder).dataset.plant_hz.values))
+
+    def bands():
+        found = plants._magnitude_and_phase(drawn, 2, plants._percentiles)
+        return [*found, plants._plant_delay(drawn, 2, 1024.0, plants._percentiles)]
+
+    whole = bands()
+    monkeypatch.setattr(plants, "BLOCK", 4 * 2 * len(drawn))
+    parts = bands()
     assert whole[1].min() < -185  # degrees, from the last three frequencies on
     for a, b in zip(whole, parts, strict=True):
         np.testing.assert_allclose(b, a, rtol=1e-12, atol=1e-12)
