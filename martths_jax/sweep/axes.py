@@ -81,9 +81,7 @@ def scalars(entries: Iterable[Entry] = ENTRIES) -> dict[str, Scalar]:
 
 def own_axes(entry: Entry) -> dict[str, tuple[str, Parameter]]:
     """Axes of an entry -> the parameter that each sets, and what its values are."""
-    plain = {
-        apart(entry, p.name): (p.name, p) for p in entry.parameters if p.is_number
-    }
+    plain = {apart(entry, p.name): (p.name, p) for p in entry.parameters if p.is_number}
     return plain | {d.name: (d.of, d.as_parameter) for d in entry.derived}
 
 
