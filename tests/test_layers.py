@@ -31,6 +31,7 @@ FLOORS = (
     ("figures",),
     ("sweep", "sensitivity", "tune"),
     ("report",),
+    ("leaderboard",),
     ("cli",),
 )  # fmt: skip
 FLOOR = {room: i for i, rooms in enumerate(FLOORS) for room in rooms}

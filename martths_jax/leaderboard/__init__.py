@@ -1,0 +1,1 @@
+"""The leaderboard: all controllers on the same plants, noise and motions."""
